@@ -31,25 +31,9 @@ from contact.typing import Array
 class Assembly:
     """The terms of a body's weak form, compiled: forces, matrices, loads.
 
-    Parameters
-    ----------
-    domain, body
-        Mesh, and materials, supports and loads.
-    space, cells, element
-        Space of the unknowns, owned cells of each material, name of the element.
-    pointwise
-        Evaluates expressions of the unknowns.
-    cuts
-        The jumps across cuts of bolts; None without any.
-
-    Attributes
-    ----------
-    at, secant_at
-        The unknowns, and those of the secant modulus where these differ.
-    laws, weak_form
-        Laws with internal variables, and the weak form.
-    time
-        The time of the loads in the weak form.
+    `cells` are the owned cells of each material, `cuts` the jumps across cuts of bolts, None
+    without any. The weak form is that at the unknowns `at`, its secant modulus that at `secant_at`
+    where these differ, and its loads are those at `time`.
     """
 
     def __init__(
@@ -199,16 +183,8 @@ class Assembly:
     def border(self, kind: str, owned: int, size: int) -> tuple[Array, Array] | None:
         """Return the derivatives by global unknowns; None without cuts. Collective.
 
-        Parameters
-        ----------
-        kind
-            "secant", or of the law itself.
-        owned, size
-            Numbers of owned unknowns of the nodes, and of global ones.
-
-        Returns
-        -------
         Those of the forces on the nodes, shape (owned, m), and on the global unknowns, (m, m).
+        `kind` is "secant", or of the law itself.
         """
         if self._cuts is None:
             return None

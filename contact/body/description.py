@@ -141,18 +141,7 @@ class Body:
         return float(np.sqrt(self.law.shear / permittivity))
 
     def check(self, dim: int) -> None:
-        """Refuse constants that are none of a material, or none of a plane body.
-
-        Parameters
-        ----------
-        dim
-            Dimension of space, 2 or 3.
-
-        Raises
-        ------
-        InputError
-            If they are not.
-        """
+        """Refuse constants that are none of a material, or none of a plane body."""
         for material in self.materials:
             young, poisson = float(material.law.young), float(material.law.poisson)
             if not ((young > 0 and -1 < poisson < 0.5) or isinstance(material.law, Anisotropic)):

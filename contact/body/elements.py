@@ -178,16 +178,9 @@ class Pointwise:
     ) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield some cells after others, and a vector there, shape (cells, points, components).
 
-        Collective where a name is asked for the first time.
-
-        Parameters
-        ----------
-        name, expression
-            Name, and the function that makes the expression of the unknowns at its first use.
-        points
-            Points of the reference cell, shape (points, d).
-        x, cells
-            Local unknowns, of which the global ones are ignored, and local numbers of cells.
+        The expression of the unknowns is made when its name is asked for the first time, which is
+        collective. The points are those of the reference cell, shape (points, d), the cells local
+        numbers; of the local unknowns x the global ones are ignored.
         """
         at = self._at = self._at or fem.Function(self._space)
         if name not in self._made:

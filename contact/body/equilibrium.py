@@ -160,19 +160,8 @@ def component_norms_of(
 class BodyEquilibrium:
     """Space, boundary conditions and weak forms of one body.
 
-    Parameters
-    ----------
-    domain
-        Mesh and named parts.
-    body
-        Material, supports and loads.
-    degree, element
-        Degree of the Lagrange elements, 1 or 2, and which of `contact.body.elements`.
-
-    Raises
-    ------
-    InputError
-        If a part is missing, a vector has the wrong length, or the material or the degree is none.
+    The Lagrange elements are of degree 1 or 2, `element` is one of `contact.body.elements`. Refuses
+    missing parts, vectors of the wrong length, and materials, degrees and elements that are none.
     """
 
     rounding_limit = MOST_ROUNDING
@@ -452,16 +441,10 @@ class BodyEquilibrium:
         counters: Counters,
         solver: str,
     ) -> SparseOperator | TransformedOperator:
-        """Return the operator of the body with blocks at nodes.
+        """Return the operator of the body with blocks at nodes, as `SparseOperator`.
 
-        Parameters
-        ----------
-        nodes
-            Contact nodes, then others with blocks, local numbers.
-        transformation
-            The transformation after which blocks belong to single nodes; None if they do without.
-        symmetric, counters, solver
-            As of `SparseOperator`.
+        The nodes are contact nodes, then others, by local numbers. The transformation makes blocks
+        those of single nodes; None if they are so without.
         """
         options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "solver": solver}
         if transformation is None:

@@ -186,10 +186,8 @@ def make_global_unknowns(
 ) -> GlobalUnknowns:
     """Return the global unknowns of a body, given the mask of free nodal unknowns. Collective.
 
-    Raises
-    ------
-    InputError
-        If rigid parts or electrodes share nodes, or a free one shares nodes with a support.
+    Refuses rigid parts or electrodes that share nodes, and free ones that share nodes with a
+    support.
     """
     members: list[Member] = []
     described: list[Rigid | Electrode | Bolt] = [*body.rigid, *body.electrodes, *body.bolts]
@@ -325,23 +323,9 @@ class Cuts:
     at the cut and u+ - u- = -s n. s is a global unknown, dual to the section force
     N = int sigma : eps(-psi n): given, or free under a given force.
 
-    Parameters
-    ----------
-    domain, space
-        Mesh, and space of the unknowns.
-    places
-        Columns of the shortenings in q, shape (k,).
-    body
-        Description of the body, whose bolts are the cuts.
-
-    Attributes
-    ----------
-    places, parts
-        Columns of q, and names of the cuts.
-    directions
-        The functions -psi n, discontinuous, of unit shortenings.
-    jump, secant_jump
-        The jumps of the unknowns `at` and `secant_at` of `contact.body.assembly`.
+    `places` are the columns of the shortenings in q, shape (k,), and `parts` the names of the cuts;
+    `directions` are the functions -psi n, discontinuous, of unit shortenings; `jump` and
+    `secant_jump` are the jumps of the unknowns `at` and `secant_at` of `contact.body.assembly`.
     """
 
     def __init__(
@@ -402,11 +386,8 @@ class Cuts:
     def check(self, nodes: NDArray[np.int32], along: Array, text: str) -> None:
         """Refuse a constraint across a cut, where the displacement is that of one side. Collective.
 
-        Parameters
-        ----------
-        nodes, along, text
-            Owned nodes, shape (n,), constrained directions there, shape (n, d, k), and words for
-            the message.
+        It is one of owned nodes, shape (n,), along directions, (n, d, k); `text` are words for the
+        message.
         """
         for part, (ends, normal) in zip(self.parts, self._ends, strict=True):
             here = np.einsum("nik,i->nk", along[np.isin(nodes, ends)], normal)

@@ -148,23 +148,9 @@ def check_law(law: HistoryLaw, size: int, comm: MPI.Intracomm) -> None:
 class QuadratureLaws:
     """The laws with internal variables among the materials of a body, which share names.
 
-    Parameters
-    ----------
-    domain, materials, cells
-        The mesh, the materials, and the owned cells of each.
-    degree, kinematics
-        Of the quadrature, and of the strains.
-    pointwise
-        Evaluates expressions of the unknowns.
-    fitted
-        Degree of the polynomials between the points of a cell.
-
-    Attributes
-    ----------
-    comm
-        Communicator of the mesh.
-    initial
-        The variables in the reference configuration; None without any.
+    `cells` are the owned cells of each material, `degree` is that of the quadrature, `fitted` that
+    of the polynomials between the points of a cell. `initial` are the variables in the reference
+    configuration; None without any.
     """
 
     def __init__(

@@ -33,11 +33,7 @@ from contact.typing import Array
 def given_loads(domain: Domain, body: Body, time: fem.Constant) -> Mapping[str, Sequence[Given]]:
     """Return the loads of a body for its weak form, by their keys; in UFL at a time. Collective.
 
-    Raises
-    ------
-    InputError
-        If a part is missing, a force has the wrong length, or a charge acts on a body without
-        a potential.
+    Refuses missing parts, forces of the wrong length, and charges on a body without a potential.
     """
     found: dict[str, list[Given]] = defaultdict(list)
     x = ufl.SpatialCoordinate(domain.mesh)
@@ -101,14 +97,8 @@ class _Share:
 class Loads:
     """The nodal forces and charges of the loads of a residual, at any time.
 
-    Parameters
-    ----------
-    residual
-        Terms of a weak form; those of loads count.
-    owned
-        Number of owned unknowns of their test functions.
-    time
-        The time of the values in UFL.
+    Of the terms of the residual those of loads count; `owned` is the number of owned unknowns of
+    their test functions, `time` the time of the values in UFL.
     """
 
     def __init__(self, residual: Sequence[Term], owned: int, time: fem.Constant) -> None:
@@ -154,10 +144,7 @@ def expression(
 ) -> Expr:
     """Return a given function at a time as UFL; a number becomes a form constant. Collective.
 
-    Raises
-    ------
-    InputError
-        On all ranks, with the key, if it is none on one.
+    A value that is no function on one rank is refused on all, with its key.
     """
     with on_all_ranks(domain.comm), naming(key):
         found = at_time(value, time).ufl(x)

@@ -31,10 +31,7 @@ from forms.piezo import Piezo
 def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
     """Return the owned cells of each material, ascending. Collective.
 
-    Raises
-    ------
-    InputError
-        If a region is missing, belongs to two materials or to none, or cells are in no region.
+    Refuses regions that are missing, or belong to two materials or to none, and cells in no region.
     """
     if len(materials) == 1 and not materials[0].on:
         return [np.arange(_count(domain), dtype=np.int32)]

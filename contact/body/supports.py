@@ -39,34 +39,18 @@ APART = 0.2
 
 @dataclass(frozen=True)
 class Support:
-    """A prescribed component of the unknowns on a part, as a function of time.
+    """A prescribed component of the unknowns on a part, as a function of time."""
 
-    Attributes
-    ----------
-    condition
-        The Dirichlet condition, with values without the amplitude.
-    values, dofs, points
-        The function of the condition's values, its dofs, shape (n,), their coordinates, (n, d).
-    comm
-        Communicator.
-    field, amplitude
-        The prescribed function, None for zero, and its factor as a function of time.
-    scale, name
-        Unit of the component in the unknowns, and name in messages.
-    check
-        Check of the values, collective; None for any values.
-    """
-
-    condition: fem.DirichletBC
-    values: fem.Function
-    dofs: NDArray[np.int32]
-    points: Array
+    condition: fem.DirichletBC  #: the Dirichlet condition, with values without the amplitude
+    values: fem.Function  #: the function of the condition's values
+    dofs: NDArray[np.int32]  #: its degrees of freedom, shape (n,)
+    points: Array  #: their coordinates, shape (n, d) (length)
     comm: MPI.Intracomm
-    field: Field | Moving | None = None
-    amplitude: Factor = steady
-    scale: float = 1.0
-    name: str = ""
-    check: Callable[[Array], None] | None = None
+    field: Field | Moving | None = None  #: the prescribed function, None for zero
+    amplitude: Factor = steady  #: its factor as a function of time
+    scale: float = 1.0  #: unit of the component in the unknowns
+    name: str = ""  #: of the component, in messages
+    check: Callable[[Array], None] | None = None  #: of the values, collective; None for any values
 
     def evaluate(self, time: float) -> None:
         """Set the values of the condition at a time. Collective where the field is."""
@@ -87,11 +71,8 @@ class Support:
 def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Support]:
     """Return a body's supports, one a component, and u_r = 0 on an axis of revolution. Collective.
 
-    Raises
-    ------
-    InputError
-        If a part is missing, a vector has the wrong length, a potential is prescribed for a
-        body without, or a radial displacement on the axis.
+    Refuses missing parts, vectors of the wrong length, a potential prescribed for a body without,
+    and a radial displacement prescribed on the axis.
     """
     supports, dim = [], domain.dim
     domain.mesh.topology.create_connectivity(dim - 1, dim)
@@ -125,10 +106,7 @@ def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Su
 def elastic_supports_of(domain: Domain, body: Body) -> list[ElasticSupport]:
     """Return the elastic supports for the weak form. Collective.
 
-    Raises
-    ------
-    InputError
-        If a part is missing, or a stiffness has the wrong length or is negative somewhere.
+    Refuses missing parts, and stiffnesses of the wrong length or negative somewhere.
     """
     found, x = [], ufl.SpatialCoordinate(domain.mesh)
     for number, support in enumerate(body.elastic):
@@ -289,33 +267,17 @@ def free_components(space: fem.FunctionSpace, supports: Sequence[Support]) -> ND
 
 @dataclass(frozen=True)
 class Roller:
-    """The displacement of a part along its normal, as a function of time.
+    """The displacement of a part along its normal, as a function of time."""
 
-    Attributes
-    ----------
-    number
-        Index among the body's `fixed`.
-    nodes, points, normal
-        Owned nodes, their coordinates (length) and unit normals, shapes (n,) and (n, d).
-    lift
-        Displacement of the nodes by a unit along the normal, in directions free of other supports,
-        shape (n, d).
-    slack
-        Relative error allowed where other supports constrain the nodes already, shape (n,).
-    field, amplitude
-        The prescribed function and its factor as a function of time.
-    comm
-        Communicator.
-    """
-
-    number: int
-    nodes: NDArray[np.int32]
-    points: Array
-    normal: Array
+    number: int  #: index among the body's `fixed`
+    nodes: NDArray[np.int32]  #: owned nodes, shape (n,)
+    points: Array  #: their coordinates, shape (n, d) (length)
+    normal: Array  #: their unit normals, shape (n, d)
+    #: Displacement by a unit along the normal, in directions free of other supports, (n, d).
     lift: Array
-    slack: Array
-    field: Field | Moving
-    amplitude: Factor
+    slack: Array  #: relative error allowed where other supports constrain the nodes already, (n,)
+    field: Field | Moving  #: the prescribed function
+    amplitude: Factor  #: its factor as a function of time
     comm: MPI.Intracomm
 
     def given(self, time: float) -> Array:
@@ -358,28 +320,13 @@ class Rollers:
     """The rollers of a body, which constrain shared nodes together.
 
     At a node with normals n_i, and A their parts along components without other supports, the
-    displacement is that of least squares, by A's pseudo-inverse. The forces are its transpose:
-    each roller bears a force along its own normal, of dependent normals the least.
-    The order of rollers has no effect. Collective to make.
+    displacement is that of least squares, by A's pseudo-inverse. The forces are its transpose: each
+    roller bears a force along its own normal, of dependent normals the least. The order of rollers
+    has no effect. Collective to make.
 
-    Parameters
-    ----------
-    domain, space, body
-        Mesh, space of the unknowns, and description of the body.
-    unsupported
-        Mask of the owned nodal unknowns without other supports, shape (nodes, block size).
-
-    Attributes
-    ----------
-    each
-        The rollers.
-    inclined
-        Their constrained directions; None without rollers.
-
-    Raises
-    ------
-    InputError
-        If a part is missing, or has an edge.
+    `unsupported` is the mask of the owned nodal unknowns without other supports, shape
+    (nodes, block size). `inclined` are the constrained directions of the rollers `each`; None
+    without rollers. Refuses parts that are missing, or have an edge.
     """
 
     def __init__(

@@ -76,21 +76,12 @@ class Term(NamedTuple):
 
 @dataclass(frozen=True)
 class WeakForm:
-    """The residual G_0(x; z) of one body, without contact.
+    """The residual G_0(x; z) of one body, without contact."""
 
-    Attributes
-    ----------
-    nu
-        The unit normal out of the body.
-    solids, elastic
-        Materials and elastic supports.
-    loads
-        Given loads by their keys in the case file, ``traction`` with resultants as well.
-    """
-
-    nu: Expr
+    nu: Expr  #: the unit normal out of the body
     solids: Sequence[Solid]
     elastic: Sequence[ElasticSupport]
+    #: By their keys in the case file, ``traction`` with resultants too.
     loads: Mapping[str, Sequence[Given]]
 
     def residual(
@@ -98,15 +89,8 @@ class WeakForm:
     ) -> list[Term]:
         """Return the terms of G_0(x; z), of each material, support and load one.
 
-        Parameters
-        ----------
-        x, z
-            Unknowns, and test functions.
-        secant_at
-            The displacement of the secant modulus (Kacanov); that of x by default.
-        history_at
-            Displacement at which stress updates with internal variables are linearised; that of
-            x by default.
+        `secant_at` is the displacement of the secant modulus (Kacanov), `history_at` that at which
+        stress updates with internal variables are linearised; by default both are that of x.
         """
         return (
             self.internal_forces(x, z, secant_at, history_at)
