@@ -28,15 +28,9 @@ Nodes = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Shape:
-    """A reference cell, or facet.
+    """A reference cell, or facet."""
 
-    Attributes
-    ----------
-    name
-        ``interval``, ``triangle``, ``quadrilateral``, ``tetrahedron`` or ``hexahedron``.
-    """
-
-    name: str
+    name: str  #: ``interval``, ``triangle``, ``quadrilateral``, ``tetrahedron`` or ``hexahedron``
 
     @property
     def kind(self) -> basix.CellType:
@@ -263,15 +257,9 @@ FACES: dict[int, tuple[tuple[int, ...], ...]] = {
 def simplices(rows: Nodes, dim: int) -> Nodes:
     """Return cells or facets cut into simplices, shape (cells, simplices, dim + 1).
 
-    A cell is the cone of its smallest corner over the faces without it, and so are these: the
+    They are given by their corners in VTK's order, shape (cells, corners), and their dimension. A
+    cell is the cone of its smallest corner over the faces without it, and so are these: the
     diagonal of a face begins at its smallest corner on both sides (Dompierre et al.).
-
-    Parameters
-    ----------
-    rows
-        Cells by the numbers of their corners in VTK's order, shape (cells, corners).
-    dim
-        Their dimension.
     """
     count = rows.shape[1]
     if count == dim + 1:

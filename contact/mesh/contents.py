@@ -98,37 +98,21 @@ class Kind:
 
 @dataclass
 class Contents:
-    """The contents of a mesh file.
+    """The contents of a mesh file."""
 
-    Attributes
-    ----------
-    points
-        Coordinates of the nodes, shape (n, 3).
-    blocks
-        Name of a shape, as meshio or basix has it, and elements by their nodes: corners in VTK's
-        order, those between them in the order of the program.
-    groups
-        Name -> number of a block -> its elements in the group.
-    nodes
-        Name -> the nodes of a set.
-    surfaces
-        Name -> facets by their corners, around them.
-    notes
-        Its other contents, one sentence each.
-    space
-        Keys of a case's ``[space]`` for which its elements were made: degree, kinematics.
-    by_groups
-        Whether cells in no group are no part of the body.
-    """
-
-    points: Any
+    points: Any  #: coordinates of the nodes, shape (n, 3)
+    #: Name of a shape, as meshio or basix has it, and elements by their nodes: corners in VTK's
+    #: order, those between them in the order of the program.
     blocks: Sequence[tuple[str, Ints]]
+    #: Name -> number of a block -> its elements in the group.
     groups: dict[str, dict[int, Ints]] = field(default_factory=dict)
-    nodes: dict[str, Ints] = field(default_factory=dict)
+    nodes: dict[str, Ints] = field(default_factory=dict)  #: name -> nodes of a set
+    #: Name -> facets by their corners, around them.
     surfaces: dict[str, Ints] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)  #: its other contents, one sentence each
+    #: Keys of a case's ``[space]`` for which its elements were made: degree, kinematics.
     space: dict[str, int | str] = field(default_factory=dict)
-    by_groups: bool = False
+    by_groups: bool = False  #: whether cells in no group are no part of the body
 
     @property
     def kinds(self) -> list[Kind]:
@@ -266,24 +250,12 @@ STRAIGHT = 1e-5
 
 @dataclass(frozen=True)
 class Groups:
-    """Named groups of cells or facets that may overlap.
-
-    Attributes
-    ----------
-    names
-        Names of the groups.
-    rows
-        Their nodes, each row once, shape (k, n).
-    labels
-        Position in ``sets`` of each row, shape (k,).
-    sets
-        Groups of the rows of a label, as positions in ``names``.
-    """
+    """Named groups of cells or facets that may overlap."""
 
     names: tuple[str, ...]
-    rows: Ints
-    labels: npt.NDArray[np.int32]
-    sets: tuple[tuple[int, ...], ...]
+    rows: Ints  #: their nodes, each row once, shape (k, n)
+    labels: npt.NDArray[np.int32]  #: position in ``sets`` of each row, shape (k,)
+    sets: tuple[tuple[int, ...], ...]  #: groups of the rows of a label, as positions in ``names``
 
     def without_rows(self) -> Groups:
         """Return the names alone, for ranks that read nothing."""
@@ -292,31 +264,17 @@ class Groups:
 
 @dataclass(frozen=True)
 class Cells:
-    """A checked mesh.
-
-    Attributes
-    ----------
-    shape
-        Of the cells.
-    points
-        Coordinates, shape (n, d).
-    regions
-        Groups of cells; their rows, shape (m, k), are all cells of the mesh by the nodes of the
-        Lagrange element of degree 1, or of degree 2 where some are curved.
-    parts
-        Groups of facets by their corners, on the boundary or of `inside`.
-    unusable, notes, space
-        As in `Domain`.
-    inside
-        The unusable parts of facets inside of the body, which may be fixed, or electrodes.
-    """
+    """A checked mesh; `unusable`, `notes` and `space` are those of `Domain`."""
 
     shape: Shape
-    points: Array
+    points: Array  #: coordinates, shape (n, d)
+    #: Groups of cells; their rows, shape (m, k), are all cells of the mesh by the nodes of the
+    #: Lagrange element of degree 1, or of degree 2 where some are curved.
     regions: Groups
-    parts: Groups
+    parts: Groups  #: groups of facets by their corners, on the boundary or of `inside`
     unusable: dict[str, str]
     notes: tuple[str, ...]
+    #: The unusable parts of facets inside of the body, which may be fixed, or electrodes.
     inside: tuple[str, ...] = ()
     space: Mapping[str, int | str] = field(default_factory=dict)
 
@@ -336,14 +294,11 @@ SERENDIPITY = (
 def check(contents: Contents) -> Cells:
     """Check a mesh, and return it in the form in which it is distributed.
 
-    Groups may overlap. A group of facets that are not all on the boundary of the body can be
-    fixed, or an electrode, but nothing else; one without a cell is left out.
+    Groups may overlap. A group of facets that are not all on the boundary of the body can be fixed,
+    or an electrode, but nothing else; one without a cell is left out.
 
-    Raises
-    ------
-    InputError
-        For cells other than triangles or quadrilaterals in a plane z = const, or solids, of order 1
-        or 2; for flat, folded or overlapping cells; and if no part is left.
+    Refuses cells other than triangles or quadrilaterals in a plane z = const, or solids, of order 1
+    or 2; flat, folded and overlapping cells; and meshes of which no part is left.
     """
     given, empty = contents.kinds, _empty_groups(contents)
     dim = max((kind.dim for kind in given), default=0)

@@ -64,20 +64,11 @@ def deviations(
     largest change is that to the corners and to the vertices beyond them; both are zero on circles.
     All have the shape (f, edges).
 
-    Parameters
-    ----------
-    names
-        Global numbers of the corners, shape (f, c).
-    corners, normal
-        Their coordinates, shape (f, c, d), and the facets' normals, shape (f, d).
-    owners
-        The owners of the nodes; the facets are those of this rank.
-    levels
-        How often straight edges have been cut in two (`Domain.levels`): c is then that of the
-        edges before, taken at their ends, where all of the turn is.
-    values
-        Of a function at the corners, shape (f, c), infinite where it has none: c is then of its
-        height above linear interpolation along the edges.
+    The facets are those of this rank, with the global numbers of their corners, (f, c),
+    coordinates, (f, c, d), and normals, (f, d). `levels` is how often straight edges have been cut
+    in two (`Domain.levels`): c is then that of the edges before, taken at their ends, where all of
+    the turn is. With values of a function at the corners, (f, c), infinite where it has none, c is
+    that of its height above linear interpolation along the edges.
     """
     count = len(names)
     arrays = (names, corners, normal, *([] if values is None else [values]))

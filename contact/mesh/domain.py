@@ -33,17 +33,11 @@ PART_ACCEPTED = "the name of a part, or a list of names"
 
 
 class Together(str):
-    """The name of several parts together: their names with + between, one word in tables.
-
-    Attributes
-    ----------
-    members
-        The parts.
-    """
+    """The name of several parts together: their names with + between, one word in tables."""
 
     __slots__ = ("members",)
 
-    members: tuple[str, ...]
+    members: tuple[str, ...]  #: the parts
 
     def __new__(cls, members: Iterable[str]) -> Together:
         """Join names."""
@@ -107,17 +101,10 @@ class ExtendedMeasure:
     """A measure of UFL over a half plane, times the extent of the body there.
 
     It is used like a measure of UFL: it multiplies an integrand from the right.
-
-    Attributes
-    ----------
-    measure
-        dx or ds of the mesh.
-    extent
-        2 pi r, the length of the ring through a point.
     """
 
-    measure: ufl.Measure
-    extent: Expr
+    measure: ufl.Measure  #: dx or ds of the mesh
+    extent: Expr  #: 2 pi r, the length of the ring through a point
 
     def __call__(self, *arguments: Any, **settings: Any) -> ExtendedMeasure:
         """Return the measure with a subdomain or metadata of its own."""
@@ -133,16 +120,11 @@ Measure: TypeAlias = ufl.Measure | ExtendedMeasure
 
 
 def compiled(form: ufl.Form) -> fem.Form:
-    """Compile a form whose subdomains are renumbered from 0. Collective.
+    """Compile a form of one domain's measures, its subdomains renumbered from 0. Collective.
 
     UFL's signature of a form, by which FFCx finds compiled code, contains the numbers of
     subdomains: an integrand on another part would be compiled again. Subdomains with the same
     integrals become one.
-
-    Parameters
-    ----------
-    form
-        With the measures of one `Domain`.
     """
     everywhere, subdomains = [], defaultdict(list)
     for integral in form.integrals():
@@ -547,10 +529,7 @@ def on_axis(domain: Domain, points: Array) -> NDArray[np.bool_]:
 def revolved(domain: Domain) -> Domain:
     """Return the body of revolution of a half plane; nodes near the axis move onto it. Collective.
 
-    Raises
-    ------
-    InputError
-        If the mesh is not plane, or lies on the other side of the axis.
+    Refuses meshes that are not plane, or lie on the other side of the axis.
     """
     if domain.dim != 2:
         raise InputError(

@@ -120,18 +120,9 @@ def distributed_components(
 ) -> tuple[Indices, int]:
     """Return the connected component of each vertex of a distributed graph. Collective.
 
-    Parameters
-    ----------
-    space
-        A space, whose local nodes are the first vertices.
-    cells
-        Vertices of each local cell, shape (cells, n), which are connected.
-    keys
-        Of further vertices, the same on each rank that has them, shape (further, k).
-
-    Returns
-    -------
-    The components of the local vertices, shape (nodes + further,), and their number.
+    The first vertices are the local nodes of a space, (nodes,), others have keys, (further, k), the
+    same on each rank that has them; the vertices of a local cell, (cells, n), are connected. The
+    result has the components of all local vertices, (nodes + further,), and their number.
     """
     comm, index_map = lasting(space.mesh.comm), space.dofmap.index_map
     owned, nodes = index_map.size_local, index_map.size_local + index_map.num_ghosts

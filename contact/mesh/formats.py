@@ -65,11 +65,7 @@ def read_msh(file: Path) -> Contents:
 
     Gmsh executes files of another beginning as scripts, unpacks those of some endings by other
     programs, and reads options from a file beside: the file is checked, and read by another name.
-
-    Raises
-    ------
-    InputError
-        If it begins otherwise, is cut off, or Gmsh refuses it.
+    Refuses a file that begins otherwise, is cut off, or is refused by Gmsh.
     """
     with file.open("rb") as stream:
         start = re.match(rb"\$MeshFormat[ \t]*\r?\n\s*([24])[. \t]", stream.read(100))

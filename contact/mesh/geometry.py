@@ -76,10 +76,8 @@ def facet_normals(
 ) -> tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]], Array]:
     """Return the outward area vectors of the facets of a part at their nodes of a degree.
 
-    Returns
-    -------
-    The cells of the facets, (f,), the numbers of these in their cells, (f,), and the vectors,
-    (f, q, d), q = 1 for straight simplices.
+    The result has the cells of the facets, (f,), the numbers of these in their cells, (f,), and the
+    vectors, (f, q, d), q = 1 for straight simplices.
     """
     mesh, d, shape = domain.mesh, domain.dim, shape_of(domain.mesh)
     cells, place = cells_at(mesh, domain.facets(part))
@@ -167,26 +165,14 @@ def integration_weights(
 
 
 def volume(domain: Domain, region: str | None = None) -> float:
-    """Return the volume of the body, or of a region of it. Collective.
-
-    Raises
-    ------
-    InputError
-        If there is no such region.
-    """
+    """Return the volume of the body, or of a region of it. Collective."""
     of_cells = volumes(domain)
     own = of_cells if region is None else of_cells[domain.cells(region)]
     return float(domain.comm.allreduce(float(own.sum()), op=MPI.SUM))
 
 
 def area(domain: Domain, part: str) -> float:
-    """Return the area of a part of the boundary; in the plane its length. Collective.
-
-    Raises
-    ------
-    InputError
-        If there is no such part.
-    """
+    """Return the area of a part of the boundary; in the plane its length. Collective."""
     cells, place = cells_at(domain.mesh, domain.facets(part))
     shape = shape_of(domain.mesh)
     ends = shape.facet_nodes(domain.order)[place]

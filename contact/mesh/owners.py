@@ -93,14 +93,9 @@ ALONE = Owners(MPI.COMM_SELF, np.array([0, np.iinfo(np.int64).max]))
 
 
 class Halo:
-    """Values at the nodes of this rank, and then at its ghosts. Collective.
+    """Values at the `count` nodes of this rank, and then at its ghosts. Collective.
 
-    Parameters
-    ----------
-    owners, count
-        The owners of all nodes, and the number of those of this rank.
-    numbers
-        Nodes of this or other ranks whose values are needed here.
+    `numbers` are those of nodes, of this or other ranks, whose values are needed here.
     """
 
     def __init__(self, owners: Owners, count: int, numbers: Numbers) -> None:
@@ -153,16 +148,9 @@ def sparse_rows(
 ) -> tuple[Numbers, sparse.csr_array]:
     """Return rows of a matrix of which entries are given, summed at each place.
 
-    Parameters
-    ----------
-    rows
-        Ascending, shape (n,).
-    entries
-        Rows, columns and values; those of other rows are left out.
-
-    Returns
-    -------
-    Global numbers of the columns, ascending, shape (m,), and the matrix, shape (n, m).
+    The rows are ascending, shape (n,); entries are rows, columns and values, and those of other
+    rows are left out. The result are the global numbers of the columns, ascending, shape (m,), and
+    the matrix, shape (n, m).
     """
     row = np.searchsorted(rows, entries[0])
     inside = row < rows.size

@@ -148,23 +148,10 @@ def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
 
 
 def convert(file: Path, to: Path) -> Domain:
-    """Write a mesh file as XDMF of which each rank reads its share. On one rank.
+    """Write a mesh file (`from_file`) as XDMF of which each rank reads its share. On one rank.
 
-    Parameters
-    ----------
-    file
-        A file as of `from_file`.
-    to
-        The new file, ``*.xdmf``; another with the ending .h5 is written beside it.
-
-    Returns
-    -------
-    The mesh that has been written.
-
-    Raises
-    ------
-    InputError
-        As `from_file`, and if one of the new files is there already.
+    Another file with the ending .h5 is written beside it, and files that are there already are
+    refused. The mesh that has been written is returned.
     """
     domain = from_file(MPI.COMM_SELF, file)
     write(domain, to)

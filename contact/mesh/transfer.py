@@ -36,20 +36,10 @@ def refined(domain: Domain, marked: Indices | None = None) -> Domain:
 def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain, Indices]:
     """Cut every edge, or those of marked cells, in two; names are inherited. Collective.
 
-    The cells of the new mesh lie in the cells of the old one, on the same rank. Where all edges are
-    cut a curved boundary keeps its old straight facets; those of marked cells follow the curve.
-
-    Parameters
-    ----------
-    domain
-        The mesh with its parts and regions.
-    marked
-        Owned cells whose edges are cut; others are cut as far as that asks for (Plaza and Carey,
-        Appl. Numer. Math. 32, 2000). All by default.
-
-    Returns
-    -------
-    The new mesh, and the cell of the old one in which each of its owned cells lies.
+    The cells of the new mesh lie in the cells of the old one, on the same rank; the cell in which
+    each owned cell lies is the second result. Where all edges are cut a curved boundary keeps its
+    old straight facets; those of marked cells follow the curve, and others are cut as far as that
+    asks for (Plaza and Carey, Appl. Numer. Math. 32, 2000).
     """
     coarse = domain.mesh
     tdim = coarse.topology.dim
@@ -110,13 +100,7 @@ def _cut(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indice
 
 
 def check_adaptable(mesh: dmesh.Mesh) -> None:
-    """Refuse cells that cannot be refined alone.
-
-    Raises
-    ------
-    InputError
-        If they are curved, or no simplices: dolfinx has no hanging nodes.
-    """
+    """Refuse curved cells, and cells that are no simplices: dolfinx has no hanging nodes."""
     _check_straight(mesh)
     shape = shape_of(mesh)
     if not shape.simplex:
@@ -166,17 +150,8 @@ ROUNDS = 3
 
 
 def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
-    """Return the interpolant of a function in a space on another mesh. Collective.
+    """Return the interpolant of a function in a space on another mesh of the body. Collective.
 
-    Parameters
-    ----------
-    coarse
-        The function.
-    space
-        Space on another mesh of the same body.
-
-    Notes
-    -----
     On a refined mesh the new function equals the old one. A node of the new mesh slightly outside
     of the old one, as on a curved boundary, gets the value of the closest cell.
     """
