@@ -33,12 +33,7 @@ GivenAmplitude: TypeAlias = Factor | Literal["constant"]
 class Ramp:
     """The factor of given values without an amplitude: from 0 to 1 over the first stage, then 1.
 
-    A static problem is one step from time 0 to time 1.
-
-    Attributes
-    ----------
-    begin, end
-        Beginning and end of the stage.
+    `begin` and `end` are those of the stage; a static problem is one step from time 0 to time 1.
     """
 
     begin: float = 0.0
@@ -117,12 +112,9 @@ def knows_time(fields: Sequence[Field | Moving | None]) -> bool:
 def values_at(
     field: Field | Moving, points: Array, time: float, name: str, comm: MPI.Intracomm
 ) -> Array:
-    """Return the values of a field at points of shape (n, d) and a time, shape (n,). Collective.
+    """Return a field's values (n,) at points (n, d) and a time. Collective.
 
-    Raises
-    ------
-    InputError
-        On all ranks, with the name of the field, if they are no finite numbers on one.
+    InputError on all ranks, with the name of the field, if they are no finite numbers on one.
     """
     with on_all_ranks(comm), naming(name):
         values = at_time(field, time).numpy(points)
@@ -261,13 +253,7 @@ class Ufl:
         return made
 
     def numpy(self, points: Array) -> Array:
-        """Return the values at points of shape (n, d), in the local cells. Collective.
-
-        Raises
-        ------
-        InputError
-            If a point is in no cell that this rank knows.
-        """
+        """Return values at points (n, d) in local cells, InputError elsewhere. Collective."""
         function = self._function
         mesh = function.function_space.mesh
         x = np.zeros((len(points), 3))
@@ -284,13 +270,7 @@ class Ufl:
 
 
 def mesh_of(expression: Expr) -> dmesh.Mesh:
-    """Return the mesh that a UFL expression lives on.
-
-    Raises
-    ------
-    InputError
-        If it lives on none, or on several.
-    """
+    """Return the mesh that a UFL expression lives on; InputError if none, or several."""
     for coefficient in ufl.algorithms.extract_coefficients(expression):
         if isinstance(coefficient, fem.Function):
             return coefficient.function_space.mesh

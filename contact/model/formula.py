@@ -84,20 +84,10 @@ _NAMES = {name: function for name, (function, _, _) in FUNCTIONS.items()} | {
 class Expression:
     """A scalar function of the coordinates and the time, given as a number or a formula.
 
-    Formulas have NumPy's meaning: ``log`` is natural, angles are in radians, ``min`` and
-    ``max`` take two arguments or more, and a comparison counts as 1 or 0.
-
-    Parameters
-    ----------
-    source
-        A finite number or a formula in x, y, z and t.
-    time
-        The time of a formula in t: a number, or a constant of a form.
-
-    Raises
-    ------
-    InputError
-        If the source is anything else; the message names the source and the accepted ones.
+    Formulas have NumPy's meaning: ``log`` is natural, angles are in radians, ``min`` and ``max``
+    take two arguments or more, and a comparison counts as 1 or 0. The source is a finite number or
+    a formula in x, y, z and t; an InputError names any other, and the accepted ones. The time of a
+    formula in t is a number, or a constant of a form.
     """
 
     def __init__(self, source: float | str, time: float | fem.Constant | None = None) -> None:
@@ -130,22 +120,7 @@ class Expression:
         return float(Expression(self.source, time).numpy(np.zeros((1, 3)))[0])
 
     def numpy(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Evaluate at points.
-
-        Parameters
-        ----------
-        points
-            Coordinates, shape (n, 2) or (n, 3).
-
-        Returns
-        -------
-        Values, shape (n,).
-
-        Raises
-        ------
-        InputError
-            If a value is not finite, or z is used in 2-D.
-        """
+        """Return finite values (n,) at points (n, 2) or (n, 3); InputError also for z in 2-D."""
         points = np.asarray(points, dtype=np.float64)
         # An array: NumPy's numbers divide by 0, Python's do not.
         time = None if self.time is None else np.full(1, self.time, dtype=np.float64)

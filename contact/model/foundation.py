@@ -54,16 +54,9 @@ class Layer:
     def check(self, size: float) -> None:
         """Refuse laws that are none of a layer, (h~6) and (h~7) of chapter 6.
 
-        Parameters
-        ----------
-        size
-            Of the body: p_nu is looked at for penetrations up to it, or to the rigid part.
-
-        Raises
-        ------
-        InputError
-            If the thickness, p_nu or h_nu is negative or no number, p_nu presses before the layer
-            is touched, or a derivative is not the slope of its law.
+        InputError if the thickness, p_nu or h_nu is negative or no number, p_nu presses before the
+        layer is touched, or a derivative is not the slope of its law. Penetrations are those of
+        `depths`.
         """
         if not self.thickness >= 0:
             raise InputError(
@@ -94,23 +87,11 @@ class Layer:
             check_slope(f"layer: {name}: derivative", law, law.derivative, samples[samples != 0])
 
     def depths(self, size: float) -> Array:
-        """Return penetrations from 0 to the rigid part, or to the size of the body if it is less.
-
-        Parameters
-        ----------
-        size
-            Of the body.
-        """
+        """Return penetrations from 0 to the rigid part, or to the body's size if that is less."""
         return min(float(self.thickness), size) * np.concatenate([[0.0], np.logspace(-6, 0, 73)])
 
     def falls(self, size: float) -> bool:
-        """Tell whether p_nu falls somewhere: several solutions may then exist.
-
-        Parameters
-        ----------
-        size
-            Of the body.
-        """
+        """Tell whether p_nu falls somewhere up to a size: several solutions may then exist."""
         values = np.broadcast_to(self.p_nu(self.depths(size)), (74,))
         return bool(np.any(np.diff(values) < -1e-12 * values.max()))
 
@@ -149,13 +130,7 @@ class Conductor:
     share: float = 1.0
 
     def check(self) -> None:
-        """Refuse laws that lack something, or whose derivatives are not their own.
-
-        Raises
-        ------
-        InputError
-            The message names the law.
-        """
+        """Refuse laws that lack something, or whose derivatives are not their own."""
         for name, law, methods in (
             ("psi", self.psi, ("k_e", "delta", "follows_gap", "at", "gap_slope")),
             ("phi_l", self.phi_l, ("__call__", "derivative")),

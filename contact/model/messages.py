@@ -65,10 +65,7 @@ def _message(error: ErrorDetails) -> InputError:
 
 
 def sections_of(annotation: Any) -> dict[str, type]:
-    """Return the classes that read tables in an annotation, by their names.
-
-    These are sections, and dataclasses (`section.described`).
-    """
+    """Return sections and dataclasses (`section.described`) in an annotation, by their names."""
     if isinstance(annotation, type):
         reads = issubclass(annotation, BaseModel) or is_pydantic_dataclass(annotation)
         return {annotation.__name__: annotation} if reads else {}

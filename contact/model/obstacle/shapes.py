@@ -38,10 +38,7 @@ CHECKED = 50
 
 
 class Obstacle(Protocol):
-    """A rigid obstacle, seen from the contact nodes.
-
-    A new shape is a class with these three.
-    """
+    """A rigid obstacle, seen from the contact nodes: a new shape is a class with these three."""
 
     @property
     def direction(self) -> str:
@@ -57,12 +54,7 @@ class Obstacle(Protocol):
     def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
         """Return the contact direction, shape (n, d), and the gap along it, shape (n,).
 
-        Parameters
-        ----------
-        points
-            Node coordinates, shape (n, d).
-        body_normal
-            Outward unit normals of the body, shape (n, d).
+        Given the nodes' coordinates and the outward unit normals of the body, shapes (n, d).
         """
 
 
@@ -254,19 +246,10 @@ class GapFunction:
 def measured(
     obstacle: Obstacle, points: Array, normal: Array, comm: MPI.Intracomm, key: str
 ) -> tuple[Array, Array]:
-    """Return the contact directions, (n, d), and gaps, (n,), at points of a body. Collective.
+    """Return contact directions, (n, d), and gaps, (n,), by `Obstacle.measure`. Collective.
 
-    Parameters
-    ----------
-    obstacle, points, normal
-        As in `Obstacle.measure`.
-    comm, key
-        The ranks that ask together, and the name of the contact in messages.
-
-    Raises
-    ------
-    InputError
-        On all ranks, if the obstacle is none in this space, or a function of it fails on one.
+    InputError on all ranks, with the `key` of the contact, if the obstacle is none in this space,
+    or a function of it fails on one.
     """
     label, gap_shape = f"{key}.{'foundation' if obstacle.is_shape else 'gap'}", points.shape[:1]
     shape = obstacle if isinstance(obstacle, Shape) else None
@@ -337,10 +320,7 @@ class AboutAxis(Shape):
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances, and the parts of the normals along and away from the axis, (n,).
 
-        Parameters
-        ----------
-        along, radius
-            Places along the axis, from the origin of the shape on, and distances from it, (n,).
+        Given places along the axis, from the origin of the shape on, and distances from it, (n,).
         """
 
     def distance(self, points: Array) -> tuple[Array, Array]:

@@ -282,13 +282,7 @@ class Triangles(Shape):
 
 
 def read_stl(path: str | Path) -> Any:
-    """Return the surface of an STL file, a pyvista.PolyData of triangles in double precision.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or holds no triangles.
-    """
+    """Return the triangles of an STL file as pyvista.PolyData in double precision."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
