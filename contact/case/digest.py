@@ -28,16 +28,8 @@ MANNER = frozenset({"title", "case", "solver", "output"})
 def digest(case: Case) -> dict[str, str]:
     """Return the SHA-256 of each file that a case reads. On one rank.
 
-    Returns
-    -------
-    The digests by the keys of the files (``mesh.file``, ``contact.foundation.file``,
-    ``material.0.library``); of a file that a mesh file refers to by its name, too
-    (``mesh.file/part.h5``).
-
-    Raises
-    ------
-    InputError
-        If a file cannot be read.
+    By the keys of the files (``mesh.file``, ``contact.foundation.file``, ``material.0.library``);
+    of a file that a mesh file refers to by its name, too (``mesh.file/part.h5``).
     """
     given = [(key, Path(value)) for key, value in walk(case) if isinstance(value, FilePath)]
     for key, material in case.materials:
@@ -83,21 +75,11 @@ def check_same(
     accepted: str,
     ignored: frozenset[str] = MANNER,
 ) -> None:
-    """Refuse to replace or continue files of another case. On one rank.
+    """Refuse, by an InputError, to replace or continue files of another case. On one rank.
 
-    Parameters
-    ----------
-    where, found, accepted
-        Words for the message: option and folder, the files there, the ways out.
-    before, case
-        The case of the files and the one at hand, as `contact check` prints them.
-    ignored
-        Sections that may differ.
-
-    Raises
-    ------
-    InputError
-        If they differ elsewhere, or `before` is no case.
+    The cases of the files, `before`, and at hand are given as `contact check` prints them; the
+    `ignored` sections may differ. Words for the message are `where`, option and folder, `found`,
+    the files there, and `accepted`, the ways out.
     """
     said = "that do not say of which case they are"
     with suppress(ValueError, RecursionError):

@@ -24,10 +24,6 @@ def schema() -> dict[str, Any]:
 
     It knows keys, kinds of values and bounds. `contact check` knows the rest: keys that are read
     with some values of others alone, and whatever depends on the mesh.
-
-    Returns
-    -------
-    The schema, of plain dictionaries and lists.
     """
     with warnings.catch_warnings():  # defaults that are formulas, which JSON does not have
         warnings.simplefilter("ignore", PydanticJsonSchemaWarning)
