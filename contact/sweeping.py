@@ -157,15 +157,9 @@ def sweep(
 
     The `overrides` replace values of the case file, the last one of the `axes` varies fastest,
     `warm` solves have the solution before as warm start, and `columns` are further ones, as in
-    `summary_columns`. Returns the rows. Collective.
-
-    Raises
-    ------
-    Interrupted
-        After a signal; the rows before it are in the table.
-    InputError
-        If a value is not accepted, or the folder has a sweep of other input, or files that no
-        sweep has left.
+    `summary_columns`. Returns the rows; after a signal, which raises `Interrupted`, those before
+    it are in the table. A folder with a sweep of other input, or files that no sweep has left, is
+    refused. Collective.
     """
     _check_columns(columns)
     names = [axis.key for axis in axes]

@@ -107,12 +107,7 @@ def solve_condensed_first(
 ) -> End:
     """Solve by steps on the condensed body, then on the whole one, then by fallbacks. Collective.
 
-    Parameters
-    ----------
-    semismooth, begin
-        The method on the whole problem, and the initial guess.
-    condensed_steps
-        Steps on the condensed body; each solves its contact problem by `solve_contact`.
+    Each step on the condensed body solves its contact problem by `solve_contact`.
     """
     state, outcome = condensed_steps(begin)
     if not outcome.final and semismooth.steps_left > 0:
