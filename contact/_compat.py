@@ -63,7 +63,7 @@ def original_cells(mesh: Mesh) -> npt.NDArray[np.int64]:
 
 
 def facet_entities(mesh: Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """Return exterior facets as flat pairs (cell, local facet), of meshes with connectivities."""
+    """Return exterior facets as flat pairs (cell, local facet); cells and facets are connected."""
     compute = fem.compute_integration_domains
     # The dimension of the entities is an argument up to 0.9 only.
     dim = (mesh.topology.dim - 1,) if "dim" in inspect.signature(compute).parameters else ()
@@ -109,7 +109,7 @@ def surface(grid: Any) -> Any:
 
 
 def keeps_inverted_blocks() -> bool:
-    """Whether PETSc (from 3.25 on) keeps inverted nodal blocks (pbjacobi) when values change."""
+    """Whether PETSc (from 3.25 on) keeps outdated inverted blocks (pbjacobi) of a matrix."""
     return bool(PETSc.Sys.getVersion() >= (3, 25))
 
 

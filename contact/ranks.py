@@ -57,13 +57,16 @@ def collective(method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[S
 
 
 def on_root(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
-    """Run an action on rank 0; broadcast its result or raise its error (`refused`). Collective."""
+    """Run an action on rank 0; broadcast its result, or raise its error on all. Collective.
+
+    An OSError is raised as an InputError (`refused`).
+    """
     result = on_each(comm, lambda: action() if comm.rank == 0 else None)
     return comm.bcast(result)  # type: ignore[no-any-return]
 
 
 def on_each(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
-    """Run an action on each rank; raise the error of one (`refused`) on all. Collective."""
+    """Run an action on each rank; raise the error of one on all, as `on_root`. Collective."""
     result: Any = None
     with on_all_ranks(comm):
         try:

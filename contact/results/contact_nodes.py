@@ -308,7 +308,7 @@ class ContactShare:
 
     problem: ContactProblem = field(repr=False)
     state: State = field(repr=False)
-    own: NDArray[np.bool_] = field(repr=False)  #: which owned contact nodes are its
+    own: NDArray[np.bool_] = field(repr=False)  #: its nodes among the owned contact nodes
     force: Array  #: of the body on its foundation, or on the other body, see `Resultant`
     moment: Array  #: as the force
     area: float  #: tributary areas of the nodes that touch (length^(d - 1))

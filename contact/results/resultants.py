@@ -140,7 +140,11 @@ class DrivenPart:
 
     @staticmethod
     def of(problem: ContactProblem) -> DrivenPart | None:
-        """Return the part of the first displacement by a function of time, or load. Collective."""
+        """Return the driven part of a problem; None without any. Collective.
+
+        It is the first one whose displacement is prescribed as a function of time, or the first
+        one with a load.
+        """
         on = _driven(problem.description)
         if on is None:
             return None
