@@ -114,7 +114,12 @@ def nested_start(
     levels, linear = newton.nested_levels, solver.linear
     if levels is None and layout.dim == 2 and not newton.nested:
         levels = 2  # a second coarser one takes more time than it saves on the first
-    if linear == "auto" and layout.dim == 3 and not layout.coupled and multigrid.is_large(layout):
+    if (
+        linear == "auto"
+        and layout.dim == 3
+        and not layout.piezoelectric
+        and multigrid.is_large(layout)
+    ):
         # A quarter of the time of a factorisation from 2,000 unknowns on. Where it fails a start
         # is lost, and no solution.
         linear = "iterative"

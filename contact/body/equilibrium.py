@@ -469,7 +469,7 @@ class BodyEquilibrium:
         """Return the `norms` of the nodal loads at a time. Collective."""
         return self.norms(self.external(time))
 
-    def coupling_norms(self, state: LinearisationPoint) -> Array:
+    def piezo_norms(self, state: LinearisationPoint) -> Array:
         """Return the `norms` of the potential's forces and the strain's charges. Collective."""
         if not self.piezoelectric:
             return np.zeros((1, self.component_norms.count))

@@ -227,18 +227,22 @@ class Interface:
             yield self.fixed_conducting, jump, self.fixed_conducting.resting(jump)
 
     def add_forces(self, residual: Array, x: Array, multipliers: Multipliers) -> None:
-        """Add the contact forces and the charge at local unknowns to owned values."""
-        nodes = self.nodes
-        nodes.add_jump_transposed(nodes.weight[:, None] * multipliers.vectors(nodes), residual)
-        for law, jump, pressure in self.acting(x, multipliers):
-            law.nodes.add_jump_transposed(
-                law.nodes.weight[:, None] * law.force(jump, pressure), residual
-            )
+        """Add the forces T^T W (lambda + p_l nu, -D.nu) at local unknowns to owned values.
+
+        lambda of contact and friction, p_l of the layer, D.nu the charge, 0 of an insulator.
+        """
+        nodes, jump = self.nodes, self.nodes.jump(x)
+        density = self.foundation.force(jump, self.pressure(jump, multipliers))
+        density[:, : self.dim] += multipliers.vectors(nodes)
         if self.proximal is not None:
-            away = nodes.tangential_component(nodes.jump(x)) - self.proximal.about
-            nodes.add_jump_transposed(
-                self.proximal.stiffness * nodes.weight[:, None] * away, residual
-            )
+            away = nodes.tangential_component(jump) - self.proximal.about
+            density[:, : self.dim] += self.proximal.stiffness * away
+        nodes.add_jump_transposed(nodes.weight[:, None] * density, residual)
+        if self.fixed_conducting is not None:
+            law, there = self.fixed_conducting, self.fixed_conducting.nodes
+            jump = there.jump(x)
+            charge = law.force(jump, law.resting(jump))
+            there.add_jump_transposed(there.weight[:, None] * charge, residual)
 
     def add_charge(
         self, residual: Array, x: Array, change: Array, multipliers: Multipliers
@@ -250,14 +254,14 @@ class Interface:
             law.nodes.add_jump_transposed(law.nodes.weight[:, None] * density, residual)
 
     @property
-    def coupled(self) -> NDArray[np.int32]:
+    def operator_nodes(self) -> NDArray[np.int32]:
         """Nodes at which the operator has blocks: contact nodes, then fixed conducting ones."""
         if self.fixed_conducting is None:
             return self.nodes.nodes
         return np.concatenate([self.nodes.nodes, self.fixed_conducting.nodes.nodes])
 
     def weighted(self, blocks: Array, x: Array) -> Array:
-        """Return the blocks of the operator at `coupled`: those of the contact nodes, times weight.
+        """Return blocks at `operator_nodes`: those of the contact nodes, times their areas.
 
         The given ones are derivatives of nodal forces, shape (n, block size, block size), without
         weights.

@@ -132,7 +132,7 @@ class Layout:
         return self.free.shape[1]
 
     @property
-    def coupled(self) -> bool:
+    def piezoelectric(self) -> bool:
         """Whether there is a potential."""
         return self.block_size > self.dim
 

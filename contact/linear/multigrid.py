@@ -344,7 +344,7 @@ DEFAULTS = {
 
 def is_large(layout: Layout) -> bool:
     """Tell whether an iterative solver pays for a system of this size."""
-    return layout.unknowns >= LARGE[layout.dim, layout.coupled]
+    return layout.unknowns >= LARGE[layout.dim, layout.piezoelectric]
 
 
 def is_chosen(solver: str, layout: Layout) -> bool:

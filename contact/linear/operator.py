@@ -221,7 +221,7 @@ class SparseOperator:
         self._rhs, self._solution = self.matrix.createVecs()
         self.iterative = multigrid.is_chosen(solver, self.layout)
         self._modes: PETSc.NullSpace | None = None
-        if self.iterative and not self.layout.coupled:
+        if self.iterative and not self.layout.piezoelectric:
             self._modes = masked_motions(self.layout)
         self._begin()
 
@@ -235,7 +235,7 @@ class SparseOperator:
         self._hierarchy: Hierarchy | None = None
         self.ksp = PETSc.KSP().create(self.layout.comm)
         self.ksp.setOptionsPrefix(PREFIX)
-        if self.iterative and self.layout.coupled:
+        if self.iterative and self.layout.piezoelectric:
             self._split = BlockPreconditioner(self.ksp, self.layout, self.symmetric)
         elif self.iterative:
             multigrid.configure(self.ksp, self.symmetric)

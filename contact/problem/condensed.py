@@ -144,7 +144,7 @@ class CondensedEquilibrium:
         """Return the `norms` of loads, reactions and coupling forces of the whole body."""
         return self.acting
 
-    def coupling_norms(self, state: LinearisationPoint) -> Array:
+    def piezo_norms(self, state: LinearisationPoint) -> Array:
         """Return zero: part of `load_norms`."""
         return np.zeros_like(self.acting)
 
@@ -184,7 +184,7 @@ AnyProblem: TypeAlias = ContactProblem | CondensedProblem
 def at_retained_nodes(interface: Interface) -> Interface:
     """Return an interface numbered by retained nodes."""
     count = interface.nodes.nodes.size
-    first, others = np.split(np.arange(interface.coupled.size, dtype=np.int32), [count])
+    first, others = np.split(np.arange(interface.operator_nodes.size, dtype=np.int32), [count])
 
     def retained(nodes: ContactNodes, positions: NDArray[np.int32]) -> ContactNodes:
         """Return nodes of other numbers, whose unknowns are the jumps."""
@@ -207,7 +207,7 @@ class Condensation:
 
     def __init__(self, problem: ContactProblem, counters: Counters) -> None:
         self.counters = counters
-        self.nodes = problem.interface.coupled
+        self.nodes = problem.interface.operator_nodes
         self.set_load_step(problem)
         body = problem.body
         unknowns = body.global_unknowns
@@ -256,7 +256,7 @@ class Condensation:
         if not self._regular:
             return None
         reactions = body.norms(body.reactions(residual))
-        acting = body.load_norms(state.time) + reactions + body.coupling_norms(state)
+        acting = body.load_norms(state.time) + reactions + body.piezo_norms(state)
         forces = self._condense(residual, acting)
         if not np.isfinite(forces).all():
             return None

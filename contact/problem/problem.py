@@ -358,7 +358,7 @@ class ContactProblem:
     ) -> SparseOperator | TransformedOperator:
         """Return the operator of its linear systems; see `BodyEquilibrium.operator`. Collective."""
         return self.body.operator(
-            self.interface.coupled,
+            self.interface.operator_nodes,
             self.transformation,
             symmetric=symmetric,
             counters=counters,

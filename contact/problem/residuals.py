@@ -219,7 +219,7 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     on_contact = np.zeros_like(internal)
     interface.add_forces(on_contact, state.x, state.forces)
     residual = internal - body.external(state.time) + on_contact
-    exerted = body.norms(on_contact) + body.coupling_norms(state)
+    exerted = body.norms(on_contact) + body.piezo_norms(state)
     scale = loads + exerted + body.norms(body.reactions(residual))
     unbalanced = body.norms(body.unbalanced(residual))
     limit, loaded = body.rounding_limit * scale, loads > 0

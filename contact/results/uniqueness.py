@@ -61,7 +61,9 @@ def uniqueness(
     interface = problem.interface
     nodes, friction = interface.nodes, interface.friction
     known = friction.acts and friction.local and not interface.foundation.active
-    known = known and not problem.piezoelectric and interface.coupled.size == nodes.nodes.size
+    known = (
+        known and not problem.piezoelectric and interface.operator_nodes.size == nodes.nodes.size
+    )
     if not known or nodes.size == 0:
         return np.inf, False
     if nodes.size > MOST:

@@ -230,7 +230,7 @@ class PenalisedProblem:
         on_contact = np.zeros_like(residual)
         interface.add_forces(on_contact, state.x, state.forces)
         norms = body.load_norms(state.time) + body.norms(residual)
-        norms = norms + body.norms(on_contact) + body.coupling_norms(state)
+        norms = norms + body.norms(on_contact) + body.piezo_norms(state)
         self._units = body.component_norms.spread(np.where(norms > 0, norms, 1.0))
         self.snes.setTolerances(
             rtol=1e-14,

@@ -174,7 +174,7 @@ class DualNorm:
         self.problem = problem
         body, size = problem.body, problem.interface.nodes.block_size
         self._rest = body.zero_displacement()
-        coupled = problem.interface.coupled
+        coupled = problem.interface.operator_nodes
         self._operator = SparseOperator(body, coupled)
         self._operator.update("secant", BodyState(self._rest), np.zeros((coupled.size, size, size)))
 

@@ -194,7 +194,7 @@ def linear_iterations(problem: ContactProblem) -> int:
     nodal = problem.nodal(state)
     blocks = augmentation(problem.nodes, problem.scales.c, problem.frictional)
     blocks = blocks + interface.foundation.charge_block(nodal, np.ones(len(nodal)))
-    operator = SparseOperator(problem.body, interface.coupled, solver="iterative")
+    operator = SparseOperator(problem.body, interface.operator_nodes, solver="iterative")
     operator.update("secant", state, interface.weighted(blocks, state.x))
     operator.solve(-residual_forces(problem, state))
     return operator.counters.linear_iterations

@@ -136,7 +136,9 @@ def first_solve(problem, symmetric=True, compare=True):
     blocks = interface.weighted(blocks, state.x)
     found = []
     for kind in ("lu", "iterative") if compare else ("iterative",):
-        operator = SparseOperator(problem.body, interface.coupled, symmetric=symmetric, solver=kind)
+        operator = SparseOperator(
+            problem.body, interface.operator_nodes, symmetric=symmetric, solver=kind
+        )
         operator.update("secant", state, blocks)
         increment = operator.solve(-residual_forces(problem, state))
         found.append((increment, operator.counters.linear_iterations))
