@@ -90,34 +90,18 @@ def normal_and_tangential(nodes: ContactNodes, jump: Array, friction: bool) -> A
 
 @dataclass
 class RelaxationResult:
-    """End of a Uzawa block relaxation.
+    """End of a Uzawa block relaxation."""
 
-    Attributes
-    ----------
-    increment
-        dx on the owned unknowns.
-    forces
-        Contact stress lambda + r (u - phi) of the last Step 1, in equilibrium with its u.
-    z
-        Variable of the next relaxation, about the new iterate, shape (n, 1 + d).
-    iterations
-        Number of linear solves.
-    stalled
-        Whether the stagnation limit has ended it.
-    """
-
-    increment: Array
+    increment: Array  #: dx on the owned unknowns
+    #: Contact stress lambda + r (u - phi) of the last Step 1, in equilibrium with its u.
     forces: Multipliers
-    z: Array
-    iterations: int
-    stalled: bool = False
+    z: Array  #: of the next relaxation, about the new iterate, (n, 1 + d)
+    iterations: int  #: number of linear solves
+    stalled: bool = False  #: whether the stagnation limit has ended it
 
 
 def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
-    """Return derivatives of `project_disc` at z, (n, d), along directions, (n, d, k).
-
-    On the rim those of the inside.
-    """
+    """Return derivatives of `project_disc` at z (n, d) along (n, d, k); on the rim the inside's."""
     length = np.linalg.norm(z, axis=1)
     beyond = length > radius
     unit, scale = np.zeros_like(z), np.ones_like(length)
@@ -132,16 +116,9 @@ class FrozenProblem:
     """The problem of one outer iteration, with its frozen terms, and the steps on it.
 
     Contact forces and jumps are arrays of normal and tangential parts, shape (n, 1 + d). Steps take
-    the friction bound s_n, shape (n,): with `single_loop` it is not frozen.
-
-    Parameters
-    ----------
-    problem, state
-        The problem, and the iterate u_n at which layer, charge and geometry are frozen.
-    friction
-        Whether there is friction.
-    r
-        Augmentation parameter (stress/length).
+    the friction bound s_n, shape (n,): with `single_loop` it is not frozen. `state` is the iterate
+    u_n at which layer, charge and geometry are frozen, r the augmentation parameter
+    (stress/length).
     """
 
     problem: ContactProblem
@@ -292,16 +269,10 @@ def uzawa_block_relaxation(
 ) -> RelaxationResult:
     """Iterate Steps 1 to 3 of Algorithm 2 (5, 7, 9) on one frozen problem. Collective.
 
-    Parameters
-    ----------
-    frozen, operator
-        The problem, and its factorised operator with `augmentation(nodes, r, friction)`.
-    z, bound
-        Initial lambda + r (u - u_n), shape (n, 1 + d), and friction bound s_n, shape (n,).
-    domain_norm
-        L2(Omega) norm of owned unknowns, for the thesis's criterion; None for residuals.
-    poll
-        Called before each iteration, on all ranks.
+    The operator is factorised with `augmentation(nodes, r, friction)`. Given are the initial z =
+    lambda + r (u - u_n), shape (n, 1 + d), the friction bound s_n, shape (n,), and the L2(Omega)
+    norm of owned unknowns for the thesis's criterion, None for residuals; `poll` is called before
+    each iteration, on all ranks.
     """
     interface, nodes = frozen.interface, frozen.nodes
     accelerated, over = options.acceleration == "anderson", options.relaxation
