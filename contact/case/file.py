@@ -375,14 +375,8 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 def to_toml(case: Case, dimension: int | None = None, anchored: bool = False) -> str:
     """Return a case file that gives the same case again, without the keys that its method ignores.
 
-    Parameters
-    ----------
-    case
-        The case.
-    dimension
-        Of its mesh, if it is known: keys without effect there are left out.
-    anchored
-        Whether files are given with their whole paths, for a case that is read from anywhere.
+    Keys without effect in the dimension of the mesh, if it is known, are left out; files are
+    `anchored` at their whole paths for a case that is read from anywhere.
     """
     ignored = {"space": {"kinematics"}} if dimension == 3 else None
     context = {"path": os.path.abspath} if anchored else None
@@ -391,13 +385,7 @@ def to_toml(case: Case, dimension: int | None = None, anchored: bool = False) ->
 
 
 def number_at(case: Case, key: str) -> float:
-    """Return the number at a key of a case, ``load.0.traction.1``.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the number at a key of a case, ``load.0.traction.1``; InputError if there is none."""
     place: Any = _tables(case)
     try:
         for name in key.split("."):

@@ -255,14 +255,7 @@ class Mesh(Section):
         return self.origin, self.size, self.cells, self.pieces
 
     def build(self, comm: MPI.Intracomm) -> Domain:
-        """Make the mesh with its parts. Collective.
-
-        Raises
-        ------
-        InputError
-            As `rectangle`, `box`, `from_file` and `from_generator`, and if the mesh does not
-            fit into the memory.
-        """
+        """Make the mesh with its parts; InputError if it does not fit into memory. Collective."""
         read = None if self.sides else self._read(comm)
         dim = len(self.sides) // 2 if read is None else read.dim
         cells = self._planned if read is None else read.mesh.topology.index_map(dim).size_global

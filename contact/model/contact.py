@@ -234,12 +234,7 @@ class Contact(Described):
     ) -> Contact:
         """Return the contact with objects in all places, for a problem. Collective.
 
-        Parameters
-        ----------
-        domain
-            The mesh.
-        friction, electric
-            Those of contacts that have none of their own.
+        Friction and conductor are those of contacts that have none of their own.
         """
         electric = self.electric or electric
         if isinstance(electric, Electric):
