@@ -18,7 +18,7 @@ from contact.mesh import grid
 from contact.mesh.cells import SHAPES, Shape
 from contact.mesh.domain import Domain, Marker, cells_in, facets_inside, with_further_names
 from contact.mesh.grid import rotate
-from contact.mesh.reader import from_file, from_generator
+from contact.mesh.reader import ACCEPTED, from_file, from_generator
 from contact.mesh.transfer import check_adaptable, refined
 from contact.methods.signals import killed_on_signal
 from contact.model.fields import Field as Given
@@ -116,12 +116,9 @@ class Mesh(Section):
         | None
     ) = None
     """Generator of the mesh. This or `file`."""
-    file: (
-        Annotated[File, Accepted("a mesh file (.msh, .inp, .vtu, .bdf, .xdmf, .med, .e)")] | None
-    ) = None
-    """Mesh file: of Gmsh (.msh), whose named physical groups are the parts, of Abaqus or CalculiX
-    (.inp), VTK (.vtu), Nastran (.bdf), XDMF (.xdmf), MED (.med) or Exodus (.e, .exo, .ex2), with
-    their sets. Relative to the case file."""
+    file: Annotated[File, Accepted(ACCEPTED)] | None = None
+    """Mesh file; its named sets, those of Gmsh physical groups, are the parts and regions. Relative
+    to the case file."""
     origin: Vector | None = None
     """Lower left corner of a rectangle or box. Default: zeros."""
     size: (

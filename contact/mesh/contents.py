@@ -52,7 +52,7 @@ ELEMENTS: dict[str, tuple[int, int, tuple[int, ...]]] = {
 
 
 #: Endings of the names of arrays of tags, whose groups go by the number alone; arrays of no groups.
-TAGS = (":physical", ":ref", ":index", "_tags")
+TAGS = (":physical", ":ref", ":index", ":tag", ":material", "_tags")
 INNER = {"gmsh:geometrical", "gmsh:bounding_entities", "GlobalElementId", "GlobalNodeId"}
 
 

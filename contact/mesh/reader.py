@@ -75,7 +75,12 @@ FORMATS: dict[str, tuple[str, Callable[[Path], Contents]]] = {
     ".ex2": ("Exodus", read_exodus),
 }
 
-ACCEPTED = "mesh files of " + ", ".join(f"{made} ({end})" for end, (made, _) in FORMATS.items())
+_ENDINGS = {
+    program: ", ".join(ending for ending, (own, _) in FORMATS.items() if own == program)
+    for program, _ in FORMATS.values()
+}
+#: The formats in words.
+ACCEPTED = f"a mesh file of {', '.join(f'{name} ({ends})' for name, ends in _ENDINGS.items())}"
 
 
 def mesh_files(file: Path) -> list[Path]:
@@ -119,11 +124,11 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
 def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
     """Read a mesh file of one of several formats, by the ending of its name. Collective.
 
-    Abaqus and CalculiX (.inp), VTK (.vtu), XDMF (.xdmf), MED (.med), Exodus (.e, .exo, .ex2) and
-    Nastran (.bdf); any other is one for `from_msh`. Sets of cells are regions; sets of facets,
-    surfaces, and sets of nodes (the facets of the boundary all of whose nodes they have) are
-    parts. Positive whole numbers of cells or nodes in files of VTK, XDMF and Nastran are sets. Of
-    XDMF that `convert` has written each rank reads its share; other files are read on rank 0.
+    The formats are those of `FORMATS`, of Gmsh as `from_msh` reads it. Sets of cells are regions;
+    sets of facets, surfaces, and sets of nodes (the facets of the boundary all of whose nodes they
+    have) are parts. Positive whole numbers of cells or nodes in files of VTK, XDMF and Nastran are
+    sets. Of XDMF that `convert` has written each rank reads its share; other files are read on
+    rank 0.
 
     Parameters
     ----------

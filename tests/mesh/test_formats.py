@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
+from functools import partial
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 import meshes
 from contact._compat import geometry_dofmap
+from contact.case.file import parse_case
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.errors import InputError
 from contact.mesh.contents import SERENDIPITY, Contents
 from contact.mesh.formats import session
-from contact.mesh.reader import from_file, mesh_files
+from contact.mesh.reader import FORMATS, _by_meshio, from_file, mesh_files
 from tests.problems import files
 from tests.problems.sizes import integral, measures
 
@@ -217,6 +221,20 @@ def test_other_formats(name, shared_tmp_path):
     domain = from_file(COMM, shared_tmp_path / name)
     assert measures(domain) == pytest.approx(parts)
     assert regions(domain) == pytest.approx(cells)
+
+
+def test_a_format_of_meshio_is_one_entry(tmp_path, monkeypatch):
+    """Its numbers are the names of parts: markers of SU2."""
+    monkeypatch.setitem(FORMATS, ".su2", ("SU2", partial(_by_meshio, "su2")))
+    write_other(tmp_path / "plate.su2", "plate.su2")
+    domain = from_file(MPI.COMM_SELF, tmp_path / "plate.su2")
+    assert measures(domain) == pytest.approx({"8": 2.0, "9": 2.0})
+
+
+def test_the_case_file_names_every_ending():
+    with pytest.raises(InputError) as error:
+        parse_case({"mesh": {"file": 3}, "contact": {"on": "top"}})
+    assert FORMATS.keys() <= {*re.findall(r"\.\w+(?=[,)])", str(error.value))}
 
 
 @pytest.mark.parallel
