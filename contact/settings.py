@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from dataclasses import field as default
 from typing import Annotated, Any, TypeAlias, TypeVar, get_args
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -12,7 +13,7 @@ from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import CoreSchema, core_schema
 
-from contact.errors import InputError, shown
+from contact.errors import InputError, nearest, shown
 from contact.tolerances import PRECISION
 
 
@@ -56,6 +57,8 @@ class Accepted:
 
     text: str
     key: str = ""  #: of kinds of tables: the key that tells them apart
+    #: Its values, by themselves and by names that users may take for them: hints.
+    names: Mapping[str, str] = default(default_factory=dict, hash=False)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         """Wrap the validation of the type."""
@@ -68,10 +71,12 @@ class Accepted:
             for one in error.errors(include_url=False):
                 if keys_in(one["loc"]) or one["type"] == "value_error":
                     raise  # of a value inside, or complete
-            inner = isinstance(given, Mapping) and self.key in given
-            raise fault(
-                *((self.key, given[self.key]) if inner else ("", given)), self.text
-            ) from None
+            if not (isinstance(given, Mapping) and self.key in given):
+                raise fault("", given, self.text) from None
+            words = shown(given[self.key])
+            near = self.names.get(nearest(words.lower(), self.names, "{}"))
+            hint = f", did you mean {shown(near)}?" if near else ""
+            raise fault(self.key, Words(f"given {words}{hint}"), self.text) from None
 
 
 @dataclass(frozen=True)

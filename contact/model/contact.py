@@ -46,7 +46,11 @@ else:
         ]
         | Obstacle,
         OrOwn(lambda given: hasattr(given, "measure")),
-        Accepted(f"a table with shape = {either(shown(kind.shape) for kind in SHAPES)}", "shape"),
+        Accepted(
+            f"a table with shape = {either(shown(kind.shape) for kind in SHAPES)}",
+            "shape",
+            {name: kind.shape for kind in SHAPES for name in (kind.shape, kind.__name__.lower())},
+        ),
     ]
 
 NAME = "a text without blanks at its ends"

@@ -9,6 +9,7 @@ import pytest
 
 from contact.case.file import parse_case
 from contact.errors import InputError
+from contact.model.obstacle import SHAPES
 from tests.problems.bar import changed
 from tests.problems.messages import message_of
 
@@ -121,6 +122,7 @@ BAD_SHAPES = {
     ),
     "no file": ({"shape": "surface"}, {}),
     "shape": ({"shape": "ball"}, {}),
+    "class of a shape": ({"shape": "level"}, {}),
 }
 
 
@@ -133,6 +135,12 @@ def shaped(foundation, more):
 def test_messages_of_bad_shapes(snapshot):
     said = {name: message_of(shaped, *given) for name, given in BAD_SHAPES.items()}
     snapshot("refused-shapes", said)
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_the_name_of_a_class_hints_at_its_shape(kind):
+    said = message_of(shaped, {"shape": f"{kind.__name__}s"}, {})
+    assert f'did you mean "{kind.shape}"?' in said
 
 
 def test_a_surface_is_no_foundation_in_the_plane():
