@@ -135,7 +135,7 @@ def draw_energies(run: Run) -> Figure:
     if taken.any():
         ax.plot(time, taken, color=GREY, label="dissipated by friction")
     if flows:
-        ax.plot(time, plastic, color=SKY, label="dissipated by plastic flow")
+        ax.plot(time, plastic, color=SKY, label="dissipated in the materials")
     ax.set_xlabel("time")
     flat = run.axes == "xy"
     words = "energy per unit of depth" if flat else "energy"

@@ -301,7 +301,7 @@ def dissipations(problem: ContactProblem, contact: int | None = None) -> Functio
 
 
 def plastic_dissipations(problem: ContactProblem) -> Functionals:
-    """Return the dissipation by plastic flow, of bodies with internal variables."""
+    """Return the dissipation in the materials, of bodies with internal variables."""
     return {"plastic_dissipation": _lost} if problem.body.laws.initial is not None else {}
 
 
@@ -405,7 +405,7 @@ def _rubbed(problem: ContactProblem, state: State, contact: int | None) -> float
 
 
 def _lost(problem: ContactProblem, state: State) -> float:
-    """Return the energy that plastic flow takes in the step of a state. Collective."""
+    """Return the energy dissipated in the materials in the step of a state. Collective."""
     return problem.body.laws.energies(state)[0]
 
 

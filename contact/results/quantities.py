@@ -478,7 +478,9 @@ _RUN = (
     ),
     Quantity("dissipation", "work", "By friction in all steps.", files=(SWEEP,)),
     Quantity(
-        "plastic_dissipation", "work", "In the materials in the step; in the summary in all steps.",
+        "plastic_dissipation", "work",
+        "In the materials in the step, by plastic flow, or as a law of your own says, for instance "
+        "by damage; in the summary in all steps.",
         files=(SUMMARY, STEPS), functionals=f.plastic_dissipations,
     ),
     Quantity(

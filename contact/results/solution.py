@@ -238,7 +238,10 @@ class Solution(Solved):
 
     @property
     def plastic_dissipation(self) -> float | None:
-        """The energy that plastic flow took, in a step or in all of them. Collective."""
+        """The energy dissipated in the materials, in a step or in all of them. Collective.
+
+        By plastic flow, or as a law of one's own says (`forms.history.Response`), such as damage.
+        """
         body = self.problem.body
         if self.energies is not None or body.laws.initial is None:
             return None if self.energies is None else self.energies.plastic
