@@ -307,9 +307,7 @@ class BodyEquilibrium:
     def forces_of_laws(self) -> Array:
         """Return the forces of the stresses in the laws with history. Collective."""
         self.forms.at.x.array[:] = 0.0  # no other material has stresses
-        forces = self._forces(self.forms.law_forces)
-        forces[self.owned :] = 0.0
-        return forces
+        return self._forces(self.forms.law_forces)
 
     def tangent_transposed(self, state: LinearisationPoint, weights: Array) -> Array:
         """Return K^T w, owned values, with the tangent K without supports. Collective."""
