@@ -172,19 +172,12 @@ class Case(Section):
     @property
     def materials(self) -> tuple[tuple[str, Material], ...]:
         """The materials, each with its key in the file."""
-        return self._tables("material")
+        return self.sections(Material)
 
     @property
     def contacts(self) -> tuple[tuple[str, Contact], ...]:
         """The contacts, each with its key in the file."""
-        return self._tables("contact")
-
-    def _tables(self, key: str) -> tuple[tuple[str, Any], ...]:
-        """Return the table of a key or those of its list, each with its key in the file."""
-        given = getattr(self, key)
-        if isinstance(given, tuple):
-            return tuple((f"{key}.{i}", table) for i, table in enumerate(given))
-        return () if given is None else ((key, given),)
+        return self.sections(Contact)
 
     def sections(self, *kinds: type[Kind]) -> tuple[tuple[str, Kind], ...]:
         """Return the sections of some kinds, each with its key in the file."""
