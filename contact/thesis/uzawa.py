@@ -214,7 +214,7 @@ class FrozenProblem:
         """Return phi of Step 2, (3.44)."""
         return (z + self.origin - self.project(z, bound)) * (1 / self.r)
 
-    def accelerator(self, depth: int, size: Array, bound: Callable[[], Array]) -> ResidualMinimiser:
+    def accelerator(self, depth: int, size: Array, bound: Array) -> ResidualMinimiser:
         """Return the acceleration of the flat z, given the unit of stresses, (n,), and s_n."""
         nodes, shape = self.nodes, (self.nodes.weight.size, 1 + self.nodes.normal.shape[1])
         weights = np.repeat(nodes.weight / size**2, shape[1])
@@ -224,11 +224,11 @@ class FrozenProblem:
 
         def project(flat: Array) -> Array:
             z = flat.reshape(*flat.shape[:-1], *shape)
-            return self.project(z, bound()).reshape(flat.shape)
+            return self.project(z, bound).reshape(flat.shape)
 
         def derivative(flat: Array, directions: Array) -> Array:
             columns = directions.reshape(*shape, directions.shape[1])
-            found = self.projection_derivative(flat.reshape(shape), bound(), columns)
+            found = self.projection_derivative(flat.reshape(shape), bound, columns)
             return found.reshape(directions.shape)
 
         return ResidualMinimiser(inner, project, derivative, depth)
@@ -282,10 +282,7 @@ def uzawa_block_relaxation(
     rtol = max(SHARE * options.inner, ROUNDING)
     increment: Array = np.zeros_like(frozen.problem.body.owned_part(frozen.state.x))
     stagnation = Stagnation(STAGNATION_LIMIT if accelerated else STAGNATION_LIMIT_PLAIN, PROGRESS)
-
-    def current_bound() -> Array:
-        return bound
-
+    bound = bound.copy()  # with single_loop it changes
     for iteration in range(1, options.max_inner + 1):
         poll()
         # Tangential again: rounding along the normal would be amplified by the acceleration.
@@ -302,7 +299,7 @@ def uzawa_block_relaxation(
             stress_unit = interface.component_norms(stress)
         forces = frozen.multipliers(jump, stress)
         if options.single_loop and frozen.friction:
-            bound = interface.bound(jump, forces)
+            bound[:] = interface.bound(jump, forces)
         residual = float(interface_residuals(interface, jump, forces, bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
         next_z = multipliers + (1 - over) * (z - multipliers) + over * r_u
@@ -318,7 +315,7 @@ def uzawa_block_relaxation(
         z = next_z
         if accelerated:
             if accelerator is None:
-                accelerator = frozen.accelerator(options.depth, stress_unit, current_bound)
+                accelerator = frozen.accelerator(options.depth, stress_unit, bound)
             solved = (stress + r_u).ravel()
             z = accelerator.next(stress.ravel(), solved, next_z.ravel()).reshape(z.shape)
     return RelaxationResult(increment, forces, z - r_u, options.max_inner)
