@@ -147,18 +147,10 @@ class Described(Section):
     """A section that is made in Python too: its `__init__` has the arguments of Python."""
 
     @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> core_schema.CoreSchema:
-        """Let tables be read without `__init__`, so that messages name their keys."""
-        schema = handler(source)
-        model = handler.resolve_ref_schema(schema)
-        while model["type"] != "model":  # within its validators
-            model = model["schema"]
-        model["custom_init"] = False
-        return schema
-
-    @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
         """Enter the keys in the docstring, in the order of the arguments."""
+        # Tables are read without `__init__`, so that messages name their keys.
+        cls.__pydantic_custom_init__ = False
         document(cls)
 
     def __init__(self, **given: Any) -> None:
