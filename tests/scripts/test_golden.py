@@ -12,7 +12,7 @@ from contact.errors import InputError
 from scripts import golden
 from scripts.cases import CASES
 from scripts.gallery import EXAMPLES
-from scripts.golden import Value, active_set, compare
+from scripts.golden import Value, compare, digest, on_other_meshes
 from scripts.golden_problems import COARSE, PROBLEMS
 from scripts.studies.mutants import MUTANTS, ROOT, Mutant
 
@@ -34,12 +34,21 @@ def test_equal_values_and_rounding_are_no_difference():
     assert compare(STORED, changed("bar", "force", Value(2.0 + 3e-9, 1.0))) == []
 
 
-def test_the_active_set_depends_on_places_alone():
+def test_the_digest_depends_on_places_and_status_alone():
     points, statuses = [[0.0, 1.0], [0.5, 1.0], [1 / 128, 0.0]], ["open", "stick", "slip"]
-    same = active_set([[0.5 + 1e-16, 1.0], [1 / 128 - 1e-17, 0.0], [-1e-17, 1.0]],
+    same = digest([[0.5 + 1e-16, 1.0], [1 / 128 - 1e-17, 0.0], [-1e-17, 1.0]],
                       ["stick", "slip", "open"])  # fmt: skip
-    assert active_set(points, statuses) == same
-    assert active_set(points, ["open", "slip", "stick"]) != same
+    assert digest(points, statuses) == same
+    assert digest(points, ["open", "slip", "stick"]) != same
+
+
+@pytest.mark.parametrize(("version", "named"), [("4.13.1", set()), ("4.15.2", {"bar"})])
+def test_meshes_of_another_gmsh_are_not_compared(monkeypatch, version: str, named: set[str]):
+    pytest.importorskip("gmsh")
+    monkeypatch.setattr("gmsh.__version__", version)
+    one, other = ({"bar": {"mesh": Value(name)}, "block": {"mesh": Value("b")}} for name in "ac")
+    assert on_other_meshes(one, other) == named
+    assert on_other_meshes(one, one) == set()
 
 
 def test_every_case_and_example_is_a_problem_and_every_problem_is_stored():
