@@ -1,9 +1,6 @@
-"""The benchmark: `python3 -m scripts.benchmarks.bench [--coarse] [--large] [--parts a b ...]`.
+"""The benchmark: `python3 -m scripts.benchmarks.bench [--coarse] [--large] [--parts NAME ...]`.
 
-(a) the thesis's tables by each method; (b) the nonlinear solve against one linear elasticity solve
-on the same mesh; (c) one rank against two; (d) GetFEM on the same meshes; (e) plain dolfinx with a
-penalty; (f) where the time goes; (g) bodies that touch each other; (h) memory on several ranks;
-(i) load steps beside one static solve.
+`PARTS` has the parts, in the order of the page.
 
 All of it takes half an hour on two cores and 4 GB, and writes docs/benchmarks.md, its summary
 and the table of docs/scaling.md after each part: after an interruption --parts goes on with
@@ -54,7 +51,7 @@ class Bench:
 
 
 def against_one_solve(bench: Bench) -> None:
-    """Part (b): nonlinear solves in units of one linear elasticity solve."""
+    """Nonlinear solves in units of one linear elasticity solve."""
     rows = []
     sizes = {
         2: bench.sizes((16, 32), (64, 128, 256), (512,)),
@@ -85,7 +82,7 @@ def against_one_solve(bench: Bench) -> None:
 
 
 def ranks(bench: Bench) -> None:
-    """Part (c): one rank against two."""
+    """One rank against two."""
     rows = []
     sizes = {2: bench.sizes((32,), (256,), ()), 3: bench.sizes((10,), (40, 56), ())}
     for dimension, n in ((d, n) for d, chosen in sizes.items() for n in chosen):
@@ -104,7 +101,7 @@ def ranks(bench: Bench) -> None:
 
 
 def memory(bench: Bench) -> None:
-    """Part (h): memory of ranks."""
+    """Memory of ranks."""
     held = []
     for dimension, n in ((2, 32), (3, 8)) if bench.coarse else ((2, 128), (3, 20)):
         first, least = np.nan, np.nan
@@ -136,7 +133,7 @@ def memory(bench: Bench) -> None:
 
 
 def against_getfem(bench: Bench) -> None:
-    """Part (d): the same mesh, material and friction in GetFEM."""
+    """The same mesh, material and friction in GetFEM."""
     rows = []
     for n in bench.sizes((16, 32), (32, 64, 128), (256,)):
         for mu in ("0.2", "0.6"):
@@ -188,7 +185,7 @@ def pair(problem: str, mesh: str, mu: str) -> Run:
 
 
 def phases(bench: Bench) -> None:
-    """Part (f): where the time goes."""
+    """Where the time goes."""
     for dimension, n in ((2, 32), (3, 8)) if bench.coarse else ((2, 256), (3, 28)):
         found = measured([*command("phases"), str(dimension), str(n)])
         rows = [
@@ -210,23 +207,18 @@ def _script(name: str) -> Callable[[Bench], None]:
     return lambda bench: bench.script(name)
 
 
-#: Part -> its function, and the tables that it writes: by method, cost of one solve, ranks, GetFEM,
-#: plain dolfinx, phases, two bodies, memory, load steps, linear solvers.
+#: Part -> its function, and the tables that it writes, in the order of the page.
 PARTS: dict[str, tuple[Callable[[Bench], None], tuple[str, ...]]] = {
-    "a": (_script("by_method"), ("bench-tables",)),
-    "b": (against_one_solve, ("bench-ratio",)),
-    "c": (ranks, ("bench-ranks",)),
-    "d": (against_getfem, ("bench-getfem", "peer-pair")),
-    "e": (_script("peer_plain"), ("peer-plain",)),
-    "f": (phases, ("bench-phases-2d", "bench-phases-3d")),
-    "g": (_script("pair_space"), ("pair-space",)),
-    "h": (memory, ("bench-memory",)),
-    "i": (_script("steps"), ("bench-steps",)),
-    "j": (_script("solvers"), ("solvers",)),
+    "solve": (against_one_solve, ("bench-ratio",)),
+    "solvers": (_script("solvers"), ("solvers",)),
+    "phases": (phases, ("bench-phases-2d", "bench-phases-3d")),
+    "steps": (_script("steps"), ("bench-steps",)),
+    "ranks": (ranks, ("bench-ranks",)),
+    "memory": (memory, ("bench-memory",)),
+    "getfem": (against_getfem, ("bench-getfem", "peer-pair")),
+    "dolfinx": (_script("peer_plain"), ("peer-plain",)),
+    "two-bodies": (_script("pair_space"), ("pair-space",)),
 }
-
-#: In which order the page has them.
-ORDER = "bjfichdega"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -240,7 +232,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     np.set_printoptions(precision=3)
     bench = Bench(Report(given.out), given.coarse, given.large)
     begin = time.perf_counter()
-    names = [name for part in ORDER for name in PARTS[part][1]]
+    names = [name for _, written in PARTS.values() for name in written]
     failed = []
     for part in given.parts:
         try:
