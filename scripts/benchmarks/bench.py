@@ -217,7 +217,6 @@ PARTS: dict[str, tuple[Callable[[Bench], None], tuple[str, ...]]] = {
     "memory": (memory, ("bench-memory",)),
     "getfem": (against_getfem, ("bench-getfem", "peer-pair")),
     "dolfinx": (_script("peer_plain"), ("peer-plain",)),
-    "two-bodies": (_script("pair_space"), ("pair-space",)),
 }
 
 
