@@ -37,7 +37,6 @@ from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh
 from contact.problem.linearised import Equations
 from contact.results.quantities import named_functionals
-from scripts.studies.cattaneo import ball_values, cylinder_values, cylinders
 from scripts.studies.derivatives import FAMILIES, FURTHER, by_both, problem, series, size_of, values
 from tests.problems.rigid import indented
 
@@ -143,24 +142,6 @@ def test_steps_and_their_adjoint():
         assert shorter["contact_force_x"][key] == pytest.approx(
             found.steps["contact_force_x"][key][3], rel=1e-8
         )
-
-
-@pytest.mark.core
-def test_the_closed_form_of_cattaneo_and_mindlin():
-    known = ball_values(2 / 3)  # beside numbers that were computed by themselves
-    assert known.way == pytest.approx(0.0292078206, rel=1e-8)
-    assert known.by_mu == pytest.approx(-0.0228280623, rel=1e-8)
-    assert known.stick_by_mu == pytest.approx(1.54080, rel=1e-5)
-
-
-@pytest.mark.slow
-def test_cattaneo_and_mindlin_by_the_friction_coefficient():
-    # two cylinders, 24 elements on the half width of contact
-    (found, _), exact = cylinders(24, 1), cylinder_values(2 / 3)
-    assert found.by_mu == pytest.approx(exact.by_mu, rel=0.025)
-    assert found.way == pytest.approx(exact.way, rel=0.04)
-    stick = exact.stick, exact.stick_by_mu
-    assert (found.stick, found.stick_by_mu) == pytest.approx(stick, rel=5e-3)
 
 
 def test_a_problem_in_python_and_a_function():

@@ -133,7 +133,7 @@ def memory(bench: Bench) -> None:
 
 
 def against_getfem(bench: Bench) -> None:
-    """The same mesh, material and friction in GetFEM."""
+    """Solve the same mesh, material and friction in GetFEM."""
     rows = []
     for n in bench.sizes((16, 32), (32, 64, 128), (256,)):
         for mu in ("0.2", "0.6"):
