@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from contact import field_gradient, gap_gradient, load_case, parse_case, solve
+from contact import field_gradient, gap_gradient, parse_case, solve
 from contact.case.file import Case, number_at, to_toml, with_number
 from contact.derivatives.by_parameters import (
     ADJOINT,
@@ -31,7 +31,6 @@ from contact.results.solution import Solution
 from contact.typing import Array
 from forms.elasticity import hexagonal
 from forms.piezo import hexagonal_voigt
-from scripts.cases import CASES
 from scripts.reporting import Report, append, empty, options, solved
 from scripts.studies.half_space import HalfSpace
 from scripts.studies.indentation import Setting
@@ -421,47 +420,6 @@ def exponents(report: Report, fineness: float) -> None:
     )
 
 
-def known(report: Report) -> None:
-    """Tabulate derivatives that are known."""
-    columns = empty("problem", "derivative", "found", "known")
-    changes = ["mesh.cells=[64,16]", "material.law=linear", "friction.mu=0.3"]
-    bar = solved(load_case(CASES / "bar.toml", [*changes, "solver.tolerance=1e-12"]))
-    names = ["contact_force_x", "contact_force_y", "max_pressure"]
-    found = sensitivity(bar, names, ["friction.mu", "material.young"])
-    for name, value in zip(names, (-6.2189744e-4, 1.4790623e-4, 1.25772757e-2), strict=True):
-        append(columns, "bar 64 x 16", f"d {name}/d mu", found[name]["friction.mu"], value)
-    append(columns, "bar 64 x 16", "d contact_force_x/d E", found[names[0]]["material.young"], 0.0)
-    height, k, b, top = 0.5, 2.0, PIEZO["beta33"], 3.0
-    column = solved(parse_case(charged_column(height, k, top)))
-    slope = sensitivity(column, ["charge_foundation"], ["electric.k_e"])["charge_foundation"]
-    sign = np.sign(slope["electric.k_e"])
-    exact = top / (k * height / b + 1) ** 2
-    append(columns, "column", "d charge/d k", sign * slope["electric.k_e"], exact)
-    shown = {name: [f"{x:.9g}" if isinstance(x, float) else x for x in column]
-             for name, column in columns.items()}  # fmt: skip
-    report.table(
-        "known",
-        "Derivatives beside known ones",
-        shown,
-    )
-
-
-def charged_column(height: float, k: float, top: float) -> dict[str, Any]:
-    """Return a column without coupling on a foundation that conducts with a constant k."""
-    return {
-        "mesh": {"generator": "rectangle", "size": [1.0, height], "cells": [2, 4]},
-        "material": {
-            "young": 1.0,
-            "poisson": 0.3,
-            "piezo": PIEZO | {"e31": 0.0, "e33": 0.0, "e15": 0.0},
-        },
-        "fixed": [{"on": "top", "displacement": [0.0, -0.01], "potential": top}],
-        "contact": {"on": "bottom"},
-        "electric": {"law": "perfect", "k_e": k, "phi_f": 0.0},
-        "solver": {"tolerance": 1e-12},
-    }
-
-
 def cost(report: Report, coarse: bool) -> None:
     """Tabulate factorisations, back-substitutions and time beside those of the solution."""
     n = 8 if coarse else 125
@@ -530,7 +488,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
     given = options(__doc__, "derivatives", arguments)
     report = Report(given.out)
-    known(report)
     exponents(report, 4.0 if given.coarse else 12.0)
     cost(report, given.coarse)
 
