@@ -23,10 +23,13 @@ from contact import load_case, solve, write_outputs
 from contact.library.materials import find
 from scripts.cases import CASES
 from scripts.studies.half_space import HalfSpace, ball
-from scripts.studies.two_bodies import MODULUS, MU, RELATIVE, half_width
+from scripts.studies.two_bodies import half_width
 
 #: Where the tables and figures are.
 FOLDER = Path(__file__).parents[1] / "docs" / "examples"
+
+#: Half cylinders: E* and relative radius, and Coulomb's coefficient.
+MODULUS, RELATIVE, MU = 1000.0 / (2 * 0.91), 5.0, 0.3
 
 
 @dataclass(frozen=True)

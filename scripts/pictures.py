@@ -1,8 +1,7 @@
 """The pictures of docs/images that runs of the program draw.
 
 `python3 -m scripts.pictures [--out docs/images] [NAME ...]` draws those of some runs, or all, anew.
-`scripts.studies.two_bodies` and `mindlin` draw two-bodies-slip.png and two-bodies-loop.png;
-architecture.svg is drawn by hand.
+`scripts.studies.mindlin` draws two-bodies-loop.png; architecture.svg is drawn by hand.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Two elastic bodies against closed forms: Hertz's contacts, and the partial slip of two cylinders.
+"""Two elastic bodies against closed forms: Hertz's contacts, and rings that overlap.
 
 python3 -m scripts.studies.two_bodies [--out DIR] [--coarse]
 """
@@ -13,9 +13,8 @@ import numpy as np
 from contact import load_case, parse_case
 from contact.results.contact_nodes import Table, contact_table
 from contact.results.solution import Solution
-from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options, solved, subplots
+from scripts.reporting import Report, append, empty, options, solved
 from scripts.studies.curved_foundations import ratios, two_rings
 
 #: E/(1 - nu^2) of steel and aluminium of the cylinder on a block, radius there.
@@ -27,18 +26,14 @@ STEPS = 32
 #: Round bodies (SSNV104 of code_aster): radius and Young's modulus of both.
 BALL, YOUNG = 50.0, 20e3
 
-#: Half cylinders: E* and relative radius, and Coulomb's coefficient.
-MODULUS, RELATIVE, MU = 1000.0 / (2 * 0.91), 5.0, 0.3
-
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Make the tables and the figure."""
+    """Make the tables."""
     given = options(__doc__, "two_bodies", arguments)
     report = Report(given.out)
     coarse = (1.2, 0.6) if given.coarse else (1.2, 0.6, 0.3, 0.15)
     hertz(report, coarse)
     round_bodies(report, (5, 10) if given.coarse else (5, 10, 20))
-    partial_slip(report, *((0.05, 1) if given.coarse else (0.01, 2)))
     rings(report, (0.1, 0.05) if given.coarse else (0.1, 0.05, 0.025))
 
 
@@ -47,11 +42,6 @@ def table_of(solution: Solution) -> Table:
     table = contact_table(solution)
     assert table is not None  # on one rank
     return table
-
-
-def solved_file(name: str, *changes: str) -> Solution:
-    """Solve a case file."""
-    return solved(load_case(CASES / f"{name}.toml", changes))
 
 
 def hertz(report: Report, sizes: Sequence[float]) -> None:
@@ -69,15 +59,15 @@ def hertz(report: Report, sizes: Sequence[float]) -> None:
         # Lengths and pressures grow like the root of the load.
         root = np.sqrt(share)
         a, p_0 = half_width(35e3 * share, modulus, RADIUS)
-        solution = solved_file(
-            "cylinder-on-block",
+        changes = [
             f"mesh.contact_size={size * root}",
             f"mesh.contact_width={8.0 * root}",
             f"friction.mu={mu}",
             "evolution.times=[0.0, 1.0]",
             f"evolution.steps=[{steps}]",
             f"load.0.traction=[0.0, '-{350.0 * share}*t']",
-        )
+        ]
+        solution = solved(load_case(CASES / "cylinder-on-block.toml", changes))
         table = table_of(solution)
         force = table["weight"] * table["pressure"]
         found = 2 * np.sqrt(np.sum(force * table["x"] ** 2) / np.sum(force))
@@ -205,49 +195,6 @@ def half_width(force: float, modulus: float, radius: float) -> tuple[float, floa
     """Return Hertz's half width and largest pressure of a line contact."""
     a = float(np.sqrt(4 * force * radius / (np.pi * modulus)))
     return a, 2 * force / (np.pi * a)
-
-
-def cattaneo(x: Array, force: float, share: float) -> tuple[float, float, Array]:
-    """Return a, c and the tangential stress at x for Q = share mu P."""
-    a, p_0 = half_width(force, MODULUS, RELATIVE)
-    c = a * np.sqrt(1 - share)
-    full, inner = (np.sqrt(np.maximum(1 - (x / r) ** 2, 0)) for r in (a, c))
-    return a, c, MU * p_0 * (full - c / a * inner)
-
-
-def partial_slip(report: Report, size: float, degree: int) -> None:
-    """Draw the tangential stress of two half cylinders over Cattaneo's and Mindlin's.
-
-    At degree 1 stresses scatter where neighbouring elements are unlike, by 0.005 mu p_0 from node
-    to node with 52 elements in a; at degree 2 by 0.0006.
-    """
-    sizes = f"mesh.contact_size={size}", f"space.degree={degree}"
-    table = table_of(solved_file("two-half-cylinders", *sizes))
-    x, tau, bound, weight = (table[key] for key in ("x", "tau", "bound", "weight"))
-    force = float(np.sum(weight * table["pressure"]))
-    share = float(np.sum(weight * tau)) / (MU * force)
-    a, c, _ = cattaneo(x, force, share)
-    sticks = np.abs(x[table["status"] == "stick"]).max()
-    spacing = float(np.mean(np.diff(x[np.abs(x) < a])))
-    near = np.abs(x) < 1.3 * a
-    fine = np.linspace(-1.3 * a, 1.3 * a, 1001)
-    figure, ax = subplots(size=(4.5, 2.8))
-    unit = MU * half_width(force, MODULUS, RELATIVE)[1]
-    exact = cattaneo(fine, force, share)[2]
-    ax.plot(fine / a, exact / unit, "k-", lw=0.8, label="Cattaneo, Mindlin")
-    ax.plot(x[near] / a, tau[near] / unit, ".", ms=3, label="computed")
-    ax.plot(x[near] / a, bound[near] / unit, "--", lw=0.8, label=r"$\mu p$, computed")
-    ax.set_xlabel("$x/a$")
-    ax.set_ylabel(r"$\tau/(\mu p_0)$")
-    ax.legend()
-    report.figure(
-        "two-bodies-slip",
-        "Two half cylinders pressed together, then pushed along: tangential stress",
-        figure,
-        {"x": x[near], "tau": tau[near], "exact": cattaneo(x[near], force, share)[2]},
-        f"Q = {share:.3f} mu P. c/a = {(sticks + spacing / 2) / a:.3f} is found with nodes "
-        f"{spacing / a:.3f} a apart, exact is sqrt(1 - Q/(mu P)) = {c / a:.3f}.",
-    )
 
 
 def rings(report: Report, sizes: Sequence[float]) -> None:
