@@ -23,7 +23,7 @@ from contact.mesh.geometry import facet_normals
 from contact.model.fields import at_time
 from contact.plot.foundation import add_foundation, facing
 from contact.plot.run import polygons
-from contact.plot.space import Camera, rendered
+from contact.plot.space import Camera, drawable, render
 from contact.plot.style import BLUE, SKY, STYLE, heading
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -199,8 +199,8 @@ def _draw_space(figure: Figure, boundary: Array, parts: list[Part], surface: Arr
     seen = np.concatenate([boundary.reshape(-1, 3), shape.points, *(start for start, _ in arrows)])
     ax = figure.subplots()
     ax.axis("off")
-    for image in rendered(add, [Camera.of(np.array([1.0, -1.6, 0.5]), seen)]):
-        ax.imshow(image)
+    if drawable():
+        render(ax, Camera.of(np.array([1.0, -1.6, 0.5]), seen), add)
     for k, part in enumerate(parts):
         ax.plot([], [], "s", color=f"C{k}", label=part[0])
     if shape.n_cells:

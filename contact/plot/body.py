@@ -125,8 +125,8 @@ class Picture:
         """The body in 3-D."""
         ends = [self.norm.vmin, self.norm.vmax]
         colours = {"scalars": "values", "cmap": self.colours, "clim": ends}
-        shapes = foundation(self.run, self.scale)
-        return Scene(self.body, colours, Zone.of(self.run), foundation=shapes)
+        zone = Zone.of(self.run, self.run.table["entry"])
+        return Scene(self.body, zone, foundation(self.run, self.scale), colours)
 
     @property
     def colours(self) -> Any:
@@ -165,8 +165,8 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
     return Picture(run, body, skin, classes, label, scale, box, look, near, names)
 
 
-def body_figure(picture: Picture) -> Figure | None:
-    """Draw a deformed body; None in 3-D without a display."""
+def body_figure(picture: Picture) -> Figure:
+    """Draw a deformed body."""
     return draw_plane(picture) if picture.run.plane else draw_space(picture)
 
 
@@ -230,14 +230,13 @@ def _colour(ax: Axes, picture: Picture) -> None:
         smooth(ax, mesh, values, norm, colours)
 
 
-def draw_space(picture: Picture) -> Figure | None:
-    """Draw a body in 3-D from where its contact is seen; None without a display."""
+def draw_space(picture: Picture) -> Figure:
+    """Draw a body in 3-D from where its contact is seen."""
     run, look = picture.run, picture.look
     figure = sheet(0.9 if page_width() < NARROW else 0.75)
     figure.set_layout_engine("compressed")
     ax = figure.subplots()
-    if show_body(ax, run, picture.scene, look.view, picture.box) is None:
-        return None
+    _, words = show_body(ax, run, picture.scene, look.view)
     _bar(figure, picture)
-    ax.set_title(picture.title, fontsize="medium")
+    ax.set_title("\n".join([picture.title, words]).strip(), fontsize="medium")
     return figure

@@ -18,7 +18,7 @@ from contact.plot.body import body_figure, picture
 from contact.plot.contact import draw_line
 from contact.plot.run import Run, read_run, read_step
 from contact.plot.series import steps_figures
-from contact.plot.space import Scene, contact_figure
+from contact.plot.space import Scene, contact_figure, drawable
 from contact.plot.style import DEFORMED, PAGE, STYLE, Look, fitted, image, name_and_label
 from contact.ranks import refused
 
@@ -46,19 +46,19 @@ def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Galle
     `fields` the body is drawn alone, coloured by each of them.
     """
     found = Gallery()
+    shown = run.plane or drawable()
     with matplotlib.rc_context(look.style):
         if not fields:
-            contact = draw_line(run) if run.plane else contact_figure(run, look)
-            if contact is not None:
-                found["contact"] = contact
+            if shown:
+                found["contact"] = draw_line(run) if run.plane else contact_figure(run, look)
                 if run.title:
-                    contact.suptitle(fitted(run.title), fontsize="large")
+                    found["contact"].suptitle(fitted(run.title), fontsize="large")
             if run.steps is not None:
                 found |= steps_figures(run)
         for field in fields or [field for field in DEFORMED if field in run.body.point_data]:
-            figure = body_figure(picture(run, field, look=look))
-            if figure is not None:
-                found[name_and_label(field, run.units)[0]] = figure
+            made = picture(run, field, look=look)
+            if shown:
+                found[name_and_label(field, run.units)[0]] = body_figure(made)
     return found
 
 

@@ -5,13 +5,16 @@ A foundation is known by the gaps and directions of the contact nodes, in the fi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pyvista
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from contact.model.obstacle import Shape
 from contact.plot.contact import ends
 from contact.plot.run import Run, linear, polygons
 from contact.plot.style import BLUE, SKY
@@ -24,6 +27,10 @@ UNSEEN = 0.002
 SHALLOW = 0.1
 #: Thickness of the hatching, and room for foundations beyond their least gap, over the diameter.
 HATCHED, BEYOND = 0.03, 0.15
+#: Room about the contact parts in which rigid shapes are drawn, over the size of these.
+AROUND = 0.3
+#: Points along each axis at which distances from rigid shapes are taken.
+FINE = 60
 #: Least width of a curved part over its length.
 CURVED = 1e-6
 
@@ -173,20 +180,85 @@ def profiles(run: Run, scale: float, places: Array, box: Array | None) -> list[P
 
 
 def foundation(run: Run, scale: float) -> Any:
-    """Return the parts of rigid shapes that face the body beside displacements times a scale.
+    """Return rigid shapes in 3-D beside displacements times a scale.
 
-    They are the contact facets moved by their gaps, as far as these are not large.
+    Those that are known are whole in a box around the contact parts; of others the parts that face
+    the body: the contact facets moved by their gaps, as far as these are not large.
     """
-    distance, gap = np.full((2, len(run.table["gap"])), np.nan)
-    for table in run.contacts:
-        if np.all(table["rigid"]):
-            own, way = run.table["entry"] == table["entry"][0], scalings(run, table, None)[0]
-            distance[own] = way.distance + (scale - 1) * way.more
-            gap[own] = distance[own] - scale * way.approach
     skin = linear(run.surface)
-    row = np.asarray(skin["row"])
+    row, faces = np.asarray(skin["row"]), skin.regular_faces
+    distance, gap = np.full((2, len(run.table["gap"])), np.nan)
+    body = (skin.points + scale * skin["displacement"]).astype(float)
+    known: list[Callable[[Array], Array]] = []
+    for table in run.contacts:
+        entry = table["entry"][0]
+        if not np.all(table["rigid"]):
+            continue
+        way = scalings(run, table, None)[0]
+        more = (scale - 1) * way.more
+        if entry in run.shapes:
+            facets = body[faces[(skin["entry"] == entry)[faces].all(axis=1)]].mean(axis=1)
+            known.append(_placed(run.shapes[entry], table, more, facets, run.diameter))
+        else:
+            own = run.table["entry"] == entry
+            distance[own], gap[own] = (
+                way.distance + more,
+                way.distance + more - scale * way.approach,
+            )
     places = skin.points + np.where(row < 0, np.nan, distance[row])[:, None] * skin["normal"]
-    return facing(places[skin.regular_faces], gap[row][skin.regular_faces], run.diameter)
+    found = facing(places[faces], gap[row][faces], run.diameter)
+    if known:
+        near = body[skin["rigid"] > 0]
+        room = AROUND * np.ptp(near, axis=0).max()
+        box = np.array([near.min(axis=0) - room, near.max(axis=0) + room])
+    for shape in known:
+        surface = _surface(shape, box)
+        for other in known:
+            if other is not shape and surface.n_cells:
+                surface["other"] = other(surface.points)
+                surface = surface.clip_scalar(scalars="other", value=0.0, invert=False)
+        found = found.append_polydata(surface)
+    return found
+
+
+def _placed(
+    shape: Shape, table: Table, more: Array, facets: Array, diameter: float
+) -> Callable[[Array], Array]:
+    """Return the distances from a shape as it is drawn.
+
+    It has moved, and is farther away by `more`: translated, as far as the contact directions let
+    it. It is drawn a little behind the facets of the body, which are chords where that is round.
+    """
+    points = np.column_stack([table[axis] for axis in "xyz"])
+    normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"])
+    lever = np.hstack([normal, np.cross(points, normal)])
+    motion = np.linalg.lstsq(lever, table["moved"], rcond=1e-9)[0]
+    touching = table["status"] != "open"
+    near = touching if touching.any() else slice(None)
+    motion[:3] += np.linalg.lstsq(normal[near], more[near], rcond=1e-3)[0]
+    level = float(np.mean(table["moved"][near] + more[near] - lever[near] @ motion))
+
+    def distance(places: Array) -> Array:
+        return shape.distance(places - motion[:3] - np.cross(motion[3:], places))[0] + level
+
+    level += float(np.clip(-np.nanmin(distance(facets)), 0.0, 0.01 * diameter))
+    level += UNSEEN * diameter
+    return distance
+
+
+def _surface(distance: Callable[[Array], Array], box: Array) -> Any:
+    """Return the surface where a distance is 0 in a box: at first roughly, then where it is."""
+    for _ in range(2):
+        step = np.ptp(box, axis=0) / (FINE - 1)
+        # Beside the round numbers: centres and axes of shapes have no distance.
+        grid = pyvista.ImageData(dimensions=3 * [FINE], spacing=step, origin=box[0] + 1e-7 * step)
+        grid["distance"] = distance(grid.points)
+        found = grid.contour([0.0], scalars="distance", compute_scalars=False)
+        if not found.n_points:
+            break
+        low, high = np.reshape(found.bounds, (3, 2)).T
+        box = np.array([np.maximum(low - step, box[0]), np.minimum(high + step, box[1])])
+    return found
 
 
 def facing(corners: Array, gap: Array, diameter: float) -> Any:
@@ -201,8 +273,10 @@ def facing(corners: Array, gap: Array, diameter: float) -> Any:
 
 
 def add_foundation(plotter: Any, shape: Any) -> None:
-    """Add a rigid shape, through which the body is seen, with its rim."""
+    """Add a rigid shape, through which the body is seen, with its outline."""
     lit = {"ambient": 0.5, "diffuse": 0.5, "smooth_shading": True}
     plotter.add_mesh(shape, color=SKY, opacity=0.3, show_scalar_bar=False, **lit)
-    rim = shape.extract_feature_edges(feature_edges=False, manifold_edges=False)
-    plotter.add_mesh(rim, color=BLUE, line_width=2.0)
+    plotter.add_silhouette(shape, color=BLUE, line_width=2.0)
+    rim = shape.extract_feature_edges(60.0, manifold_edges=False)
+    if rim.n_cells:  # none of a ball
+        plotter.add_mesh(rim, color=BLUE, line_width=2.0)

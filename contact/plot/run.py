@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from warnings import catch_warnings, simplefilter
@@ -18,6 +19,8 @@ from scipy.spatial import KDTree
 
 from contact import _compat
 from contact.errors import InputError
+from contact.model.contact import Contact
+from contact.model.obstacle import Shape
 from contact.plot.style import heading
 from contact.ranks import refused
 from contact.results.contact_nodes import Table
@@ -46,6 +49,8 @@ class Run:
         Grids of pyvista: body, contact part, and the other sides of contacts between bodies.
     regions
         Names of the regions, in the order of the numbers in the field ``region``.
+    shapes
+        The rigid shapes by the numbers of their contacts, as far as the case has them.
     step
         Number of the step that these are the results of, from 1; None for the last results.
     steps, tables
@@ -60,6 +65,7 @@ class Run:
     surface: Any
     opposite: Any = None
     regions: Sequence[str] = ()
+    shapes: Mapping[int, Shape] = field(default_factory=dict)
     step: int | None = None
     steps: Table | None = None
     tables: Sequence[Table] = ()
@@ -144,9 +150,18 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             surface,
             opposite=read_grid(folder / OPPOSITE) if OPPOSITE in files else None,
             regions=about.get("regions", ()),
+            shapes=_shapes(about.get("case", "")),
             steps=_columns(folder / "steps.csv") if "steps.csv" in files else None,
             tables=_tables(folder / "contact-steps.csv") if "steps.csv" in files else (),
         )
+
+
+def _shapes(case: str) -> dict[int, Shape]:
+    """Return the rigid shapes of a case by the numbers of their contacts."""
+    tables = tomllib.loads(case).get("contact", [])
+    contacts = map(Contact.model_validate, tables if isinstance(tables, list) else [tables])
+    found = {k: contact.foundation for k, contact in enumerate(contacts)}
+    return {k: shape for k, shape in found.items() if isinstance(shape, Shape)}
 
 
 def read_step(folder: Path, number: int) -> Run:

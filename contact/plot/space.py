@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyvista
@@ -14,11 +14,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from contact import _compat
-from contact.plot.foundation import add_foundation, foundation, magnification
+from contact.plot.contact import TOUCHING, patches
+from contact.plot.foundation import add_foundation, foundation
 from contact.plot.run import Run, linear, polygons
 from contact.plot.style import BLUE, NARROW, ORANGE, SKY, ZONES, Look, colour_bar, page_width, sheet
 from contact.results.quantity import STATUS
@@ -43,15 +45,12 @@ class Camera:
         Unit vectors of the picture, shape (3,).
     low, high
         Corners of the picture along these, shape (2,).
-    depth
-        Where the scene is, along the direction to the eye.
     """
 
     right: Array
     up: Array
     low: Array
     high: Array
-    depth: float
 
     @property
     def view(self) -> Array:
@@ -68,62 +67,53 @@ class Camera:
         return (*np.array([self.low, self.high]).T.ravel(),)
 
     @staticmethod
-    def of(view: Array, points: Array, margin: float = 0.04) -> Camera:
+    def of(view: Array, points: Array, margin: float = 0.04, above: Array | None = None) -> Camera:
         """Return the camera that sees points, shape (n, 3), from a direction, z upwards."""
         view = view / np.linalg.norm(view)
-        above = np.eye(3)[2 if abs(view[2]) < SNAPPED else 1]
+        if above is None:
+            above = np.eye(3)[2 if abs(view[2]) < SNAPPED else 1]
         right = np.cross(above, view) / np.linalg.norm(np.cross(above, view))
-        return Camera.along(right, np.cross(view, right), points, margin)
-
-    @staticmethod
-    def along(right: Array, up: Array, points: Array, margin: float) -> Camera:
-        """Return the camera with these axes that sees points."""
+        up = np.cross(view, right)
         flat = points @ np.array([right, up]).T
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        room = margin * float((high - low).max())
-        middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        return Camera(right, up, low - room, high + room, float(middle @ np.cross(right, up)))
+        room = margin * float(np.ptp(flat, axis=0).max())
+        return Camera(right, up, flat.min(axis=0) - room, flat.max(axis=0) + room)
 
     def aim(self, plotter: Any) -> None:
         """Turn the camera of a plotter."""
-        middle = (self.low + self.high) / 2
-        focus = middle @ np.array([self.right, self.up]) + self.depth * self.view
-        far = float(np.linalg.norm(plotter.bounds)) + 1.0
+        focus = (self.low + self.high) / 2 @ np.array([self.right, self.up])
+        far = 1e3 * float(np.linalg.norm(plotter.bounds))  # outlines are those seen from there
         plotter.enable_parallel_projection()
         plotter.camera.focal_point, plotter.camera.position = focus, focus + far * self.view
         plotter.camera.up, plotter.camera.parallel_scale = self.up, (self.high - self.low)[1] / 2
         plotter.renderer.ResetCameraClippingRange()
 
 
-def rendered(
-    add: Callable[[Any], None], cameras: Sequence[Camera], pixels: int = 1200, ground: str = "white"
-) -> list[Array]:
-    """Return images of a scene, with so many pixels on the longer side; none without a display.
-
-    The scene is added to a ``pyvista.Plotter``, and seen by each camera.
-    """
+def drawable() -> bool:
+    """Return whether scenes can be rendered here; warn if not."""
     if not os.environ.get("DISPLAY") and pyvista.vtk_version_info < (9, 4):
         try:
             pyvista.start_xvfb()
         except OSError:
             logger.warning("nothing is drawn in 3-D: VTK before 9.4 needs a display or Xvfb")
-            return []
-    plotter = pyvista.Plotter(off_screen=True)
-    plotter.set_background(ground)
+            return False
+    return True
+
+
+def render(ax: Axes, camera: Camera, add: Callable[[Any], None], pixels: int = 1600) -> None:
+    """Draw a scene, which is added to a ``pyvista.Plotter``, as a camera sees it."""
+    size = np.ceil(pixels * (camera.high - camera.low) / np.max(camera.high - camera.low))
+    plotter = pyvista.Plotter(off_screen=True, window_size=[max(int(n), 2) for n in size])
+    plotter.set_background("white")
     add(plotter)
-    found = []
-    for camera in cameras:
-        size = camera.high - camera.low
-        plotter.window_size = [max(int(n), 2) for n in np.ceil(pixels * size / size.max())]
-        camera.aim(plotter)
-        found.append(np.asarray(plotter.screenshot(return_img=True)))
+    camera.aim(plotter)
+    ax.imshow(plotter.screenshot(return_img=True), extent=camera.extent)
     plotter.close()
-    return found
 
 
-def triad(ax: Axes, camera: Camera) -> None:
-    """Draw the directions of the coordinates into a corner."""
-    inset = ax.inset_axes((0.0, -0.1, 0.16, 0.16))
+def triad(ax: Axes, camera: Camera, corner: tuple[float, float], share: float) -> None:
+    """Draw the directions of the coordinates at a corner, of a share of the longer side."""
+    size = camera.high - camera.low
+    inset = ax.inset_axes((*corner, *(share * size.max() / size)))
     inset.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
     inset.axis("off")
     for name, step in zip("xyz", camera.flat(np.eye(3)), strict=True):
@@ -133,31 +123,28 @@ def triad(ax: Axes, camera: Camera) -> None:
             inset.text(*place, f"${name}$", ha="center", va="center", fontsize=7)
 
 
-def scale_bar(ax: Axes, camera: Camera, run: Run) -> None:
-    """Draw the length of a round number, where axes have no coordinates."""
-    wide = float((camera.high - camera.low)[0]) / 3
-    power = 10.0 ** np.floor(np.log10(wide))
-    length = power * max(k for k in (1, 2, 5) if k * power <= wide)
-    ax.plot([0.05, 0.05 + length / (3 * wide)], [-0.05] * 2, "k", lw=2, transform=ax.transAxes,
-            clip_on=False)  # fmt: skip
-    words = f"{length:g} {run.units.length or ''}".rstrip()
-    ax.text(0.05, -0.08, words, transform=ax.transAxes, va="top", fontsize=7)
-
-
 #: Colours of a body without a field, and of nodes that are no contact nodes.
 PLAIN, UNKNOWN = "#DADADA", "#FFFFFF"
 #: Direction from which bodies are seen, of those that see the contact alike.
 USUAL = np.array([1.0, -1.6, 0.9]) / np.linalg.norm([1.0, -1.6, 0.9])
 #: Angles from the mean normal of the contact to the eye (degrees), the best first.
 TILTS = 55.0, 25.0
-#: Share of the contact zone that is seen at least; bodies that hide more are cut open.
+#: Share of the contact zone that is seen at least; bodies that hide more are translucent.
 SEEN = 0.3
+#: Share of a contact zone that a body of its own has at least: cells near by may be another's.
+OWN = 0.2
+#: Facets from which it is asked whether they are seen.
+RAYS = 40
 #: Smallest resultant of the unit normals of a contact zone that has a side, per area.
 SIDED = 0.3
+#: Most contacts that have close-ups of their own.
+CLOSE = 2
 #: Room about a contact zone in close-ups, over its size.
-ROOM = 0.35
+ROOM = 0.25
 #: Contact zones below this part of the body are marked on it.
 SMALL = 0.1
+#: How far painted facets lie in front of the body, over its diameter.
+LIFTED = 1e-3
 #: Facets up to which the mesh is drawn.
 FACETS = 8000
 
@@ -185,16 +172,17 @@ class Zone:
     ----------
     corners, area
         The triangles that touch, shape (n, 3, 3), and their area vectors, shape (n, 3).
+    displacement, pressure
+        At the corners, shape (n, 3, 3) and (n, 3).
     normal
         The mean normal of a side of it, shape (3,), that of an axis if it is nearly so.
-    sides
-        1, or -1 too where it is seen from both sides of the normal alone.
     """
 
     corners: Array
     area: Array
+    displacement: Array
+    pressure: Array
     normal: Array
-    sides: tuple[int, ...]
 
     @property
     def points(self) -> Array:
@@ -202,62 +190,102 @@ class Zone:
         return self.corners.reshape(-1, 3)
 
     @staticmethod
-    def of(run: Run) -> Zone:
-        """Return the zone of a run."""
+    def of(run: Run, entries: Array) -> Zone:
+        """Return the zone of some contacts of a run."""
         skin = linear(run.surface)
-        faces, area = skin.regular_faces, areas(run, skin)
-        touching = (skin["status"] > STATUS["open"])[faces].any(axis=1)
-        if not touching.any():
-            touching[:] = True
-        corners, pressure = skin.points[faces][touching], skin["pressure"][faces][touching]
-        area = area[touching]
+        own = np.isin(skin["entry"], entries)[skin.regular_faces].all(axis=1)
+        touching = own & (skin["status"] > STATUS["open"])[skin.regular_faces].any(axis=1)
+        chosen = touching if touching.any() else own
+        faces, area = skin.regular_faces[chosen], areas(run, skin)[chosen]
+        corners, moved = np.array([skin.points, skin["displacement"]], dtype=float)[:, faces]
+        pressure = np.nan_to_num(skin["pressure"])[faces]
         size = np.linalg.norm(area, axis=1)
         normal = area.sum(axis=0)
         if np.linalg.norm(normal) < SIDED * size.sum():  # around a shaft, or between two plates
-            normal = area[np.argmax(np.nan_to_num(pressure).sum(axis=1))]
+            force = pressure.mean(axis=1)
+            normal = area.T @ force
+            if np.linalg.norm(normal) <= 0.1 * (size @ force):  # alike on all sides
+                normal = np.eye(3)[np.argmax(abs(area).sum(axis=0).round(6))]
         normal = normal / np.linalg.norm(normal)
         if abs(normal).max() > SNAPPED:
             normal = np.where(abs(normal) > SNAPPED, np.sign(normal), 0.0)
-        behind = area @ normal < -0.1 * size
-        both = size[behind].sum() > 0.02 * size.sum()
-        return Zone(np.asarray(corners, dtype=float), area, normal, (1, -1) if both else (1,))
+        return Zone(corners, area, moved, pressure, normal)
+
+    def lifted(self, size: float) -> Any:
+        """Return the deformed triangles, a little in front of a body of that size."""
+        out = self.area / np.linalg.norm(self.area, axis=1)[:, None]
+        mesh = polygons(self.corners + self.displacement + LIFTED * size * out[:, None])
+        mesh["pressure"] = self.pressure.ravel()
+        return mesh
 
 
-def chosen_view(run: Run, skin: Any, zone: Zone) -> tuple[Array, bool] | None:
-    """Return the direction from which a body is seen, and whether it is cut open; None undrawn.
+class Sight(NamedTuple):
+    """How a body is seen."""
 
-    That from which most of the contact zone is seen, tilted from its mean normal; where bodies
-    hide it from all sides, one along which it is cut.
+    #: Direction to the eye, shape (3,).
+    eye: Array
+    #: Which cells are translucent, shape (n,).
+    clear: NDArray[np.bool_]
+    #: Words on it for titles.
+    words: str = ""
+    #: Normal and a point of the plane beyond which the body is cut away, if it is.
+    cut: tuple[Array, Array] | None = None
+
+
+def chosen_sight(run: Run, zone: Zone, cut: bool = False) -> Sight:
+    """Return how the contact zone of a run is seen.
+
+    From where most of it is seen, tilted from its mean normal. Bodies beside its own are
+    translucent, and so is that if it hides it from all sides; or they are cut open instead.
     """
+    size = np.linalg.norm(zone.area, axis=1)[:, None]
+    places, out = zone.corners.mean(axis=1), zone.area / size
+    cells, bodies = run.body.cell_centers().points, run.body.connectivity().cell_data["RegionId"]
+    inside = KDTree(cells).query(places - np.sqrt(size) / 2 * out)[1]
+    share = np.bincount(bodies[inside], size.ravel(), bodies.max() + 1) / size.sum()
+    other = share[bodies] < OWN
     e1 = np.linalg.svd(zone.normal[None])[2][1]
-    e2, turns = np.cross(zone.normal, e1), np.arange(0.0, 2 * np.pi, np.pi / 4)
-
-    def turned(angle: float) -> Array:
-        return np.cos(turns + angle)[:, None] * e1 + np.sin(turns + angle)[:, None] * e2
-
     # Oblique: along an axis of a box two of its edges would be one line.
-    ring, oblique, tilts = turned(0.0), turned(np.pi / 8), np.radians(TILTS)
-    views = np.concatenate([np.cos(t) * zone.normal + np.sin(t) * oblique for t in tilts])
-    size = np.linalg.norm(zone.area, axis=1)[:, None, None]
-    lifted = zone.corners + 1e-3 * np.sqrt(size.sum()) * zone.area[:, None] / size
+    turns = np.arange(0.0, 2 * np.pi, np.pi / 4) + np.pi / 8
+    ring = np.outer(np.cos(turns), e1) + np.outer(np.sin(turns), np.cross(zone.normal, e1))
+    tilts = np.radians(TILTS)
+    views = np.concatenate([np.cos(t) * zone.normal + np.sin(t) * ring for t in tilts])
+    skin = linear(run.body.extract_cells(~other))
+    some = np.unique(np.linspace(0, len(zone.area) - 1, RAYS).astype(int))
+    front = np.maximum(zone.area[some] @ views.T, 0.0)
+    starts = (places + LIFTED * run.diameter * out)[some]
+    free = [
+        [not skin.ray_trace(x, x + skin.length * view)[1].size for view in views] for x in starts
+    ]
+    shares = (front * free).sum(axis=0) / front.sum(axis=0)
+    preferred = np.minimum(shares, 0.8) - 0.1 * (np.arange(len(views)) >= len(turns))
+    eye, hidden = views[np.argmax(preferred + 0.2 * views @ USUAL)], shares.max() < SEEN
+    if cut:
+        return section(run, zone) if hidden or other.any() else Sight(eye, other)
+    if hidden:
+        return Sight(eye, np.ones_like(other), "the body translucent")
+    return Sight(eye, other, "the other body translucent" if other.any() else "")
 
-    def add(plotter: Any) -> None:
-        plotter.add_mesh(skin, color="black", lighting=False)
-        plotter.add_mesh(polygons(lifted), color="white", lighting=False)
 
-    cameras = [Camera.of(view, zone.points) for view in views]
-    images = rendered(add, cameras, 100, "black")
-    if not images:
-        return None
-    lit = np.array([(image[..., 0] > 127).mean() for image in images])
-    lit = lit * [np.prod(camera.high - camera.low) for camera in cameras]
-    shares = lit / np.maximum(zone.area @ views.T, 0.0).sum(axis=0)
-    if shares.max() >= SEEN:
-        preferred = np.minimum(shares, 0.8) - 0.1 * (np.arange(len(views)) >= len(turns))
-        return views[np.argmax(preferred + 0.2 * views @ USUAL)], False
-    centre, points = zone.points.mean(axis=0), np.asarray(skin.points)
-    removed = ((points - centre) @ ring.T > 0).mean(axis=0)
-    return ring[np.argmin(removed - 0.1 * ring @ USUAL)], True
+def section(run: Run, zone: Zone) -> Sight:
+    """Return the sight of a body that is cut open, through the middle of its contact zone.
+
+    Along its normal, across an axis. Where the zone ends at a face of the body, as at a plane of
+    symmetry, nothing is cut away.
+    """
+    axes = np.eye(3) - np.outer(zone.normal, zone.normal)
+    size = np.linalg.norm(axes, axis=1)
+    axes = axes[size > 0.5] / size[size > 0.5, None]
+    axes = np.concatenate([axes, -axes])
+    along, own = run.body.points @ axes.T, zone.points @ axes.T
+    middle = (zone.points.min(axis=0) + zone.points.max(axis=0)) / 2
+    at_face = own.max(axis=0) + LIFTED * run.diameter > along.max(axis=0)
+    removed = np.where(at_face, 0.0, (along > middle @ axes.T).mean(axis=0))
+    k = int(np.argmin(removed - 0.1 * axes @ USUAL))
+    above = np.copysign(1.0, zone.normal @ USUAL) * zone.normal
+    eye = axes[k] + 0.4 * (above + np.cross(above, axes[k]))
+    words, cut = ("", None) if at_face[k] else ("cut open", (axes[k], middle))
+    return Sight(eye, np.zeros(run.body.n_cells, dtype=bool), words, cut)
 
 
 @dataclass(frozen=True)
@@ -268,64 +296,46 @@ class Scene:
     ----------
     body
         The grid of the deformed body.
-    colours
-        Arguments of ``add_mesh`` for its colours.
-    zone, painted
-        The contact zone, and the touching facets of the deformed part, drawn on the body.
-    norm
-        The range of the pressures on that.
+    zone
+        Where it is in contact.
     foundation
         Rigid shapes, drawn translucent.
+    colours
+        Arguments of ``add_mesh`` for the colours of a field.
+    painted
+        Whether that is the pressure, on the contact zone of a plain body.
     """
 
     body: Any
-    colours: dict[str, Any]
     zone: Zone
-    painted: Any = None
-    norm: Normalize = field(default_factory=Normalize)
-    foundation: Any = None
+    foundation: Any
+    colours: Mapping[str, Any]
+    painted: bool = False
 
     @staticmethod
     def of(run: Run) -> Scene:
         """Return a plain body with its contact pressure, whose range is that of all nodes."""
-        scale = magnification(run)
-        part = linear(run.surface.warp_by_vector("displacement", factor=scale))
-        touched = (part["status"] > STATUS["open"])[part.regular_faces].any(axis=1)
-        painted = pyvista.PolyData.from_regular_faces(part.points, part.regular_faces[touched])
-        painted["pressure"] = np.nan_to_num(part["pressure"])
-        body = run.body.warp_by_vector("displacement", factor=scale)
-        norm = Normalize(0.0, float(np.max(run.table["pressure"], initial=0.0)) or 1.0)
-        painted = painted if touched.any() else None
-        shapes = foundation(run, scale)
-        return Scene(body, {"color": PLAIN}, Zone.of(run), painted, norm, shapes)
+        ends = [0.0, float(np.max(run.table["pressure"], initial=0.0)) or 1.0]
+        shades = {"scalars": "pressure", "cmap": "viridis", "clim": ends, "lighting": False}
+        body, zone = run.body.warp_by_vector("displacement"), Zone.of(run, run.table["entry"])
+        return Scene(body, zone, foundation(run, 1.0), shades, painted=True)
 
-    @property
-    def shades(self) -> dict[str, Any]:
-        """Arguments of ``add_mesh`` for the pressure."""
-        ends = [self.norm.vmin, self.norm.vmax]
-        return {"scalars": "pressure", "cmap": "viridis", "clim": ends, "lighting": False}
-
-    def add(self, plotter: Any, view: Array | None = None, cut: bool = False) -> None:
-        """Add the body to a plotter, cut open across the direction to the eye."""
-        grid = self.body
-        if cut:
-            grid = grid.clip(normal=view, origin=self.zone.points.mean(axis=0))
-        skin = _compat.surface(grid)
-        faint = {"show_edges": skin.n_cells < FACETS, "line_width": 0.5, "edge_opacity": 0.2}
-        lit = {"ambient": 0.6, "diffuse": 0.45, "smooth_shading": True, "split_sharp_edges": True}
-        lines = {"manifold_edges": False, "non_manifold_edges": False}
-        edges = skin.extract_feature_edges(40.0, **lines)
-        if edges.n_cells:
-            plotter.add_mesh(edges, color="black", line_width=2.5)
-        if self.foundation is not None and self.foundation.n_cells:
+    def add(self, plotter: Any, sight: Sight | None = None) -> None:
+        """Add the body to a plotter."""
+        grid, look = self.body, {"color": PLAIN} if self.painted else self.colours
+        if sight is not None and sight.cut is not None:
+            grid = grid.clip(*sight.cut)
+        elif sight is not None and sight.clear.any():
+            _add_body(plotter, grid.extract_cells(sight.clear), color=PLAIN, opacity=0.25)
+            grid = grid.extract_cells(~sight.clear)
+        if self.foundation.n_cells:
             add_foundation(plotter, self.foundation)
         # The bar of colours is that of the mesh that is added last.
-        plotter.add_mesh(skin, show_scalar_bar=False, **lit, **faint, **self.colours)
-        if self.painted is not None:
-            size = float(np.linalg.norm(np.ptp(skin.points, axis=0)))
-            away = self.zone.normal if view is None else view
-            lifted = self.painted.translate(2e-3 * size * away)
-            plotter.add_mesh(lifted, show_scalar_bar=False, **self.shades)
+        if grid.n_cells:
+            _add_body(plotter, grid, **look)
+        if self.painted and self.zone.pressure.any():
+            mesh = self.zone.lifted(float(np.ptp(self.body.points, axis=0).max()))
+            plotter.add_mesh(mesh, show_scalar_bar=False, **self.colours)
 
     def window(self, label: str) -> Any:
         """Return a plotter that shows the scene in a window to turn it in, or in a notebook."""
@@ -338,42 +348,42 @@ class Scene:
         return plotter
 
 
-def show_body(ax: Axes, run: Run, scene: Scene, view: Any, box: Array) -> Camera | None:
-    """Draw the scene in a box into axes, from a direction or where contact is seen."""
-    given = (np.asarray(view, dtype=float) / np.linalg.norm(view), False) if view else None
-    found = given or chosen_view(run, linear(run.body), scene.zone)
-    if found is None:
-        return None
-    towards, cut = found
-    eye = towards + 0.35 * scene.zone.normal if cut else towards
-    corners = np.array([box[list(which), range(3)] for which in np.ndindex(2, 2, 2)])
-    shape = scene.foundation
-    points = corners if shape is None else np.concatenate([corners, shape.points])
-    camera = Camera.of(eye, points)
-    images = rendered(lambda plotter: scene.add(plotter, towards, cut), [camera])
-    if not images:
-        return None
-    ax.imshow(images[0], extent=camera.extent, interpolation="antialiased")
+def _add_body(plotter: Any, grid: Any, **look: Any) -> None:
+    """Add the surface of a grid, smooth, with its edges and a faint mesh."""
+    skin = _compat.surface(grid)
+    faint = {"show_edges": skin.n_cells < FACETS, "line_width": 0.5, "edge_opacity": 0.2}
+    lit = {"ambient": 0.6, "diffuse": 0.45, "smooth_shading": True, "split_sharp_edges": True}
+    edges = skin.extract_feature_edges(40.0, manifold_edges=False, non_manifold_edges=False)
+    if edges.n_cells:
+        plotter.add_mesh(edges, color="black", line_width=2.5)
+    plotter.add_mesh(skin, show_scalar_bar=False, **lit, **faint, **look)
+
+
+def show_body(ax: Axes, run: Run, scene: Scene, view: Any) -> tuple[Camera, str]:
+    """Draw the scene, from a direction or where contact is seen; return camera and words on it."""
+    sight = chosen_sight(run, scene.zone, cut=not scene.painted)
+    if view:
+        sight = Sight(np.asarray(view, dtype=float), sight.clear, sight.words * (sight.cut is None))
+    camera = Camera.of(sight.eye, np.concatenate([scene.body.points, scene.foundation.points]))
+    render(ax, camera, lambda plotter: scene.add(plotter, sight))
     ax.axis("off")
-    triad(ax, camera)
+    triad(ax, camera, (0.0, -0.16), 0.2)
     flat = camera.flat(scene.zone.points)
-    if np.ptp(flat, axis=0).max() < SMALL * (camera.high - camera.low).max():
+    if scene.painted and np.ptp(flat, axis=0).max() < SMALL * (camera.high - camera.low).max():
         ring = {"markersize": 16, "markerfacecolor": "none", "color": ORANGE, "clip_on": False}
         ax.plot(*flat.mean(axis=0), "o", **ring)
-    return camera
+    return camera, sight.words
 
 
-def contact_figure(run: Run, look: Look) -> Figure | None:
-    """Draw the body where it is in contact, pressure, status and friction; None undrawn."""
+def contact_figure(run: Run, look: Look) -> Figure:
+    """Draw the body where it is in contact, pressure, status and friction."""
     scene, table = Scene.of(run), run.table
-    zone, norm = scene.zone, scene.norm
     touching = bool(np.any(table["status"] != "open"))
-    box = np.reshape(scene.body.bounds, (3, 2)).T
     frictional, narrow = bool(np.any(table["bound"] > 0)), page_width() < NARROW
     others = [] if run.opposite is None else [run.opposite]
-    rows, columns = 2 + len(others), len(zone.sides)
-    words = [""] if columns == 1 else [" (front)", " (back)"]
-    shades = scene.shades | {"nan_color": ZONES["open"][0]}
+    closes = close_ups(run, scene.zone)
+    rows, columns = 2 + len(others), len(closes)
+    shades = {**scene.colours, "nan_color": ZONES["open"][0]}
     figure = sheet(2.1 if narrow else 0.7 if rows == 2 else 0.95)
     figure.set_layout_engine("constrained")
     grid = (
@@ -382,34 +392,34 @@ def contact_figure(run: Run, look: Look) -> Figure | None:
         else figure.add_gridspec(rows, 1 + columns, width_ratios=[1.5] + columns * [1.0])
     )
     whole = figure.add_subplot(grid[0, :] if narrow else grid[:, 0])
-    if show_body(whole, run, scene, look.view, box) is None:
-        return None
-    whole.set_title("pressure on the body" if touching else "no contact", fontsize="medium")
+    camera, words = show_body(whole, run, scene, look.view)
+    title = "pressure on the body" if touching else "no contact"
+    whole.set_title("\n".join([title, words]).strip(), fontsize="medium")
     axes = []
-    for k, (side, which) in enumerate(zip(zone.sides, words, strict=True)):
-        camera = close_camera(run, zone, side)
-        front = seen(run, run.surface, side * zone.normal, camera)
-        meshes = [front, *(seen(run, other, None, camera) for other in others)]
-        titles = ["contact pressure", *["pressure on the other side"] * len(others), "status"]
-        titles = [title + which for title in titles]
+    for k, (zone, side, name) in enumerate(closes):
+        close = close_camera(zone, side, camera)
+        front = seen(run, run.surface, zone, side * zone.normal)
+        meshes = [front, *(seen(run, other, zone) for other in others)]
+        titles = ["contact pressure", *["on the other side"] * len(others), "status"]
         panels = [
             figure.add_subplot(grid[1 + r, k] if narrow else grid[r, 1 + k]) for r in range(rows)
         ]
         for panel, mesh in zip(panels, meshes, strict=False):
-            _shown(panel, camera, mesh, **shades)
-        _show_status(panels[-1], front, camera)
-        longest = _show_friction(panels[-1], front, camera) if frictional else 0.0
+            _shown(panel, close, mesh, **shades)
+        _show_status(panels[-1], front, close)
+        longest = _show_friction(panels[-1], front, close) if frictional else 0.0
         if longest:
             unit = f" {run.units.stress}" if run.units.stress else ""
-            titles[-1] = f"status, friction{which}\nlongest arrow {longest:.3g}{unit}"
-        for panel, title in zip(panels, titles, strict=True):
-            panel.set_title(title, fontsize="medium")
-            _frame(panel, camera, run, last=panel is panels[-1])
+            titles[-1] = f"status, friction\nlongest arrow {float(f'{longest:.3g}'):g}{unit}"
+        titles[0] = "\n".join([name, titles[0]]).strip()
+        for panel, text in zip(panels, titles, strict=True):
+            panel.set_title(text, fontsize="medium" if columns == 1 else "small")
+            _frame(panel, close, run, last=panel is panels[-1])
         axes += panels
     if touching:
         label = run.units.label(r"$-\sigma_\nu$", "stress")
-        label += f", peak {norm.vmax:.4g}"
-        colour_bar(figure, [whole, *axes], norm, "viridis", label)
+        norm = Normalize(*scene.colours["clim"])
+        colour_bar(figure, [whole, *axes], norm, "viridis", f"{label}, peak {norm.vmax:.4g}")
     columns = 2 if narrow else 4
     figure.legend(handles=_legend(run, frictional), ncols=columns, loc="outside lower center")
     return figure
@@ -417,49 +427,49 @@ def contact_figure(run: Run, look: Look) -> Figure | None:
 
 def _legend(run: Run, frictional: bool) -> list[Patch]:
     """Return the legend of the status with the numbers of contact nodes."""
-    words = {zone: label for zone, (_, label) in ZONES.items()}
-    if not frictional:
-        words = {"slip": "in contact", "open": "open"}
-    found = []
-    for zone, label in words.items():
+    found = patches(frictional)
+    for patch, zone in zip(found, ZONES if frictional else TOUCHING, strict=True):
         count = np.count_nonzero(run.table["status"] == zone)
-        found.append(Patch(color=ZONES[zone][0], label=f"{label}: {count} nodes"))
+        patch.set_label(f"{patch.get_label()}: {count} nodes")
     if np.any(run.table["rigid"]):
         found.append(Patch(facecolor=to_rgba(SKY, 0.3), edgecolor=BLUE, label="foundation"))
     return found
 
 
-def close_camera(run: Run, zone: Zone, side: int) -> Camera:
-    """Return the camera of a close-up: in coordinate planes the first axis runs to the right."""
-    places = np.asarray(run.surface.points, dtype=float)
-    if abs(zone.normal).max() == 1:
-        right, up = np.delete(np.eye(3), np.argmax(abs(zone.normal)), axis=0)
-    else:
-        made = Camera.of(side * zone.normal, places)
-        right, up = made.right, made.up
-    flat = places @ np.array([right, up]).T
-    extent = float(np.ptp(flat, axis=0).max())
-    touches = (zone.area @ zone.normal) * side > 0
-    own = zone.corners[touches].reshape(-1, 3) if touches.any() else zone.points
-    size = float(np.ptp(own @ np.array([right, up]).T, axis=0).max())
-    camera = Camera.along(right, up, own, 0.0)
-    room = ROOM * size
-    low = np.maximum(camera.low - room, flat.min(axis=0) - 0.12 * extent)
-    high = np.minimum(camera.high + room, flat.max(axis=0) + 0.12 * extent)
-    return Camera(right, up, low, high, camera.depth)
+def close_ups(run: Run, zone: Zone) -> list[tuple[Zone, int, str]]:
+    """Return the zones of close-ups, the sides from which they are seen, and their names.
 
-
-def seen(run: Run, grid: Any, towards: Array | None, camera: Camera) -> Any:
-    """Return the triangles of a contact part near the scene of a camera.
-
-    Those alone that face a direction, if one is given.
+    Of few contacts each, else all as one.
     """
+    touching = np.unique(run.table["entry"][run.table["status"] != "open"])
+    if 1 < len(touching) <= CLOSE:
+        parts = [table for table in run.contacts if table["entry"][0] in touching]
+        return [(Zone.of(run, part["entry"]), 1, str(part["on"][0])) for part in parts]
+    size = np.linalg.norm(zone.area, axis=1)
+    behind = zone.area @ zone.normal < -0.1 * size
+    if size[behind].sum() <= 0.02 * size.sum():
+        return [(zone, 1, "")]
+    return [(zone, 1, "front"), (zone, -1, "back")]
+
+
+def close_camera(zone: Zone, side: int, whole: Camera) -> Camera:
+    """Return the camera of a close-up: along the normal, from outside, upwards as the whole is.
+
+    In coordinate planes upwards along the axis that is nearest to it.
+    """
+    above = whole.up - (whole.up @ zone.normal) * zone.normal
+    if abs(zone.normal).max() == 1:
+        above = np.sign(above) * (abs(above) == abs(above).max())
+    facing = (zone.area @ zone.normal) * side > 0
+    return Camera.of(side * zone.normal, zone.corners[facing].reshape(-1, 3), ROOM, above)
+
+
+def seen(run: Run, grid: Any, zone: Zone, towards: Array | None = None) -> Any:
+    """Return the triangles of a contact part around a zone; those that face a direction, if any."""
     skin = linear(grid)
-    faces = np.asarray(skin.regular_faces)
-    centres = skin.points[faces].mean(axis=1)
-    room = camera.high - camera.low
-    there = np.all(abs(camera.flat(centres) - (camera.low + camera.high) / 2) < room, axis=1)
-    there &= abs(centres @ camera.view - camera.depth) < room.max()
+    faces, low, high = skin.regular_faces, zone.points.min(axis=0), zone.points.max(axis=0)
+    away = abs(skin.points[faces].mean(axis=1) - (low + high) / 2) - (high - low) / 2
+    there = away.max(axis=1) < max(high - low)
     if towards is not None:
         there &= areas(run, skin) @ towards > 0
     front = pyvista.PolyData.from_regular_faces(skin.points, faces[there])
@@ -474,8 +484,7 @@ def _shown(ax: Axes, camera: Camera, mesh: Any, **colours: Any) -> None:
         if mesh.n_cells:
             plotter.add_mesh(mesh, show_scalar_bar=False, **{"lighting": False, **colours})
 
-    (image,) = rendered(add, [camera], 800)
-    ax.imshow(image, extent=camera.extent, interpolation="antialiased")
+    render(ax, camera, add, 800)
 
 
 def _show_status(ax: Axes, front: Any, camera: Camera) -> None:
@@ -518,19 +527,17 @@ def _show_friction(ax: Axes, front: Any, camera: Camera) -> float:
 
 
 def _frame(ax: Axes, camera: Camera, run: Run, last: bool) -> None:
-    """Label a close-up: coordinates in coordinate planes, else a length."""
+    """Label a close-up: coordinates in coordinate planes, else lengths beside their directions."""
     ax.set(xlim=camera.extent[:2], ylim=camera.extent[2:])
     ax.set_aspect("equal")
-    if abs(camera.view).max() == 1:
-        names = ["xyz"[int(np.argmax(axis))] for axis in (camera.right, camera.up)]
-        ax.set_ylabel(run.units.label(f"${names[1]}$", "length"))
-        if last:
-            ax.set_xlabel(run.units.label(f"${names[0]}$", "length"))
-        else:
-            ax.tick_params(labelbottom=False)
-        return
-    ax.set(xticks=[], yticks=[])
-    if last:
-        scale_bar(ax, camera, run)
-    else:
-        triad(ax, camera)
+    plane = abs(camera.view).max() == 1
+    for axis, along in ((ax.xaxis, camera.right), (ax.yaxis, camera.up)):
+        name = f"${'xyz'[abs(along).argmax()]}$" if plane else "length"
+        sign = along.sum() if plane else 1.0  # of an axis that is seen from behind
+        axis.set_major_formatter(lambda value, _, sign=sign: f"${sign * value + 0.0:g}$")
+        axis.set_label_text(run.units.label(name, "length"))
+    if not last:
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False)
+    elif not plane:
+        triad(ax, camera, (-0.6, -0.6), 0.4)

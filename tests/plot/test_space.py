@@ -9,12 +9,9 @@ import pytest
 from contact.cli.main import main
 from contact.plot import figures
 from contact.plot.body import picture
-from contact.plot.run import Run, linear
-from contact.plot.space import (
-    Zone,
-    chosen_view,
-    contact_figure,
-)
+from contact.plot.foundation import foundation
+from contact.plot.run import Run
+from contact.plot.space import Camera, Zone, chosen_sight, close_camera, contact_figure
 from contact.plot.style import Look
 from contact.solving import solve
 from contact.writing import write_outputs, written
@@ -25,11 +22,11 @@ OPPOSITE = {"left": "right", "front": "back", "bottom": "top"}
 OPPOSITE |= {b: a for a, b in OPPOSITE.items()}
 
 
-def pressed(on: Any = "bottom", side: str = "bottom", **more: Any) -> Run:
+def pressed(on: Any = "bottom", side: str = "bottom", by: float = 1e-3, **more: Any) -> Run:
     """Return the run of a block with a side that its opposite presses on a plane."""
     axis = abs(AXES[side]) - 1
     size, normal, push = [2.0, 1.0, 1.0], np.zeros(3), np.zeros(3)
-    normal[axis], push[axis] = -np.sign(AXES[side]), 1e-3 * np.sign(AXES[side])
+    normal[axis], push[axis] = -np.sign(AXES[side]), by * np.sign(AXES[side])
     point = [size[axis] if k == axis and AXES[side] > 0 else 0.0 for k in range(3)]
     plane = {"shape": "plane", "point": point, "normal": normal.tolist()}
     sections: dict[str, Any] = {
@@ -47,13 +44,102 @@ def pressed(on: Any = "bottom", side: str = "bottom", **more: Any) -> Run:
 def test_the_camera_sees_the_contact(side: str) -> None:
     """Whatever way it faces: no part of the body is in between."""
     run = pressed(side, side)
-    zone, outward = Zone.of(run), np.sign(AXES[side]) * np.eye(3)[abs(AXES[side]) - 1]
+    outward = np.sign(AXES[side]) * np.eye(3)[abs(AXES[side]) - 1]
+    zone = Zone.of(run, run.table["entry"])
     np.testing.assert_array_equal(zone.normal, outward)
-    assert zone.sides == (1,)
-    found = chosen_view(run, linear(run.body), zone)
-    assert found is not None
-    view, cut = found
-    assert view @ outward > 0.5 and not cut
+    sight = chosen_sight(run, zone)
+    assert sight.eye @ outward > 0.5 and not sight.clear.any() and sight.words == ""
+    # From outside, not mirrored, and upwards as the body is seen.
+    whole = Camera.of(sight.eye, run.body.points)
+    close = close_camera(zone, 1, whole)
+    np.testing.assert_array_equal(close.view, outward)
+    assert close.up @ whole.up > 0.5
+
+
+def test_the_other_body_is_translucent_or_both_are_cut_open() -> None:
+    """The contact lies between them."""
+    case = block(
+        3,
+        mesh={"generator": "two_boxes", "lower_size": 0.7, "upper_size": 0.5},
+        material={"young": 1.0, "poisson": 0.3},
+        fixed=[
+            {"on": "lower_bottom", "displacement": [0.0, 0.0, 0.0]},
+            {"on": "upper_top", "displacement": [0.0, 0.0, -0.01]},
+        ],
+        contact={"on": "upper_bottom", "against": "lower_top"},
+    )
+    run = written(solve(case))
+    assert run is not None
+    zone = Zone.of(run, run.table["entry"])
+    sight = chosen_sight(run, zone)
+    lower = run.body.cell_centers().points[:, 2] < 0
+    np.testing.assert_array_equal(sight.clear, lower)
+    assert sight.words == "the other body translucent" and sight.eye[2] < 0
+    opened = chosen_sight(run, zone, cut=True)
+    assert opened.words == "cut open" and opened.cut is not None and not opened.clear.any()
+    normal, origin = opened.cut
+    assert abs(normal @ zone.normal) < 1e-9 and normal @ opened.eye > 0
+    np.testing.assert_allclose(origin, 0.0, atol=1e-9)
+
+
+SHAPES: dict[str, dict[str, Any]] = {
+    "ball": {"shape": "sphere", "centre": [1.0, 0.5, -0.25], "radius": 0.25},
+    "large ball": {"shape": "sphere", "centre": [1.0, 0.5, -30.0], "radius": 30.0},
+    "plane": {"shape": "plane", "point": [0.0, 0.0, 0.0], "normal": [0.0, 0.0, 1.0]},
+    "cylinder": {"shape": "cylinder", "point": [0, 0.5, -3], "axis": [1, 0, 0], "radius": 3.0},
+    "cone": {"shape": "cone", "apex": [1, 0.5, 0], "axis": [0, 0, -1], "half_angle": 60.0},
+}
+
+
+@pytest.mark.parametrize("scale", [1.0, 5.0])
+@pytest.mark.parametrize("name", SHAPES)
+def test_rigid_shapes_are_drawn_whole(name: str, scale: float) -> None:
+    """As they are, moved with the body that they press, where it touches them; small ones whole."""
+    rigid = {"displacement": [0.0, 0.0, 0.01]}
+    run = pressed(contact={"on": "bottom", "foundation": SHAPES[name], "rigid": rigid}, by=0.0)
+    shape = run.shapes[0]
+    drawn = foundation(run, scale)
+    touching = run.table["status"] != "open"
+    nearest = (run.table["gap"] + run.table["moved"])[touching].min()
+    moved = np.array([0.0, 0.0, 0.01 - (scale - 1) * nearest])
+    distance = shape.distance(drawn.points - moved)[0]
+    # Behind facets that are coarser than the shape.
+    assert -0.013 * run.diameter < distance.min() <= distance.max() < 0.001 * run.diameter
+    low, high = np.reshape(drawn.bounds, (3, 2)).T
+    assert np.all(low > [-0.61, -0.61, -0.61]) and np.all(high < [2.61, 1.61, 0.66])
+    if name == "ball":
+        np.testing.assert_allclose(high - low, 0.5, atol=0.03)
+        assert not drawn.extract_feature_edges(feature_edges=False, manifold_edges=False).n_cells
+    elif name != "cone":
+        np.testing.assert_allclose((high - low)[:2], [3.2, 2.2], rtol=0.02)
+
+
+def test_planes_that_meet_end_there() -> None:
+    """Those of a groove: nothing is drawn of one inside the other."""
+    planes = [
+        {"shape": "plane", "point": [x, 0.0, 0.0], "normal": normal}
+        for x, normal in ((0.0, [0.3, 0.0, 1.0]), (2.0, [-0.3, 0.0, 1.0]))
+    ]
+    mesh = {
+        "generator": "box",
+        "size": [2.0, 1.0, 1.0],
+        "cells": [10, 2, 2],
+        "parts": {
+            "one": {"side": "bottom", "from": [0.0, 0.0], "to": [0.6, 1.0]},
+            "two": {"side": "bottom", "from": [1.4, 0.0], "to": [2.0, 1.0]},
+        },
+    }
+    contacts = [
+        {"on": on, "foundation": plane} for on, plane in zip(("one", "two"), planes, strict=True)
+    ]
+    run = pressed(contact=contacts, mesh=mesh)
+    drawn = foundation(run, 1.0)
+    for shape in run.shapes.values():
+        assert shape.distance(drawn.points)[0].min() > -0.01 * run.diameter
+    sides = drawn.points[:, 0] < 1.0
+    assert np.ptp(drawn.points[sides, 2]) == pytest.approx(
+        np.ptp(drawn.points[~sides, 2]), rel=0.05
+    )
 
 
 def test_the_peak_is_that_of_all_nodes() -> None:
