@@ -157,11 +157,15 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
 
 
 def _shapes(case: str) -> dict[int, Shape]:
-    """Return the rigid shapes of a case by the numbers of their contacts."""
+    """Return the rigid shapes of a case by the numbers of their contacts.
+
+    Not those that files describe, which may be elsewhere by now.
+    """
     tables = tomllib.loads(case).get("contact", [])
     contacts = map(Contact.model_validate, tables if isinstance(tables, list) else [tables])
     found = {k: contact.foundation for k, contact in enumerate(contacts)}
-    return {k: shape for k, shape in found.items() if isinstance(shape, Shape)}
+    known = {k: shape for k, shape in found.items() if isinstance(shape, Shape)}
+    return {k: shape for k, shape in known.items() if getattr(shape, "file", None) is None}
 
 
 def read_step(folder: Path, number: int) -> Run:

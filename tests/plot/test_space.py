@@ -1,6 +1,7 @@
 """Figures in 3-D: what the cameras see, and what of the tables is drawn."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -112,6 +113,16 @@ def test_rigid_shapes_are_drawn_whole(name: str, scale: float) -> None:
         assert not drawn.extract_feature_edges(feature_edges=False, manifold_edges=False).n_cells
     elif name != "cone":
         np.testing.assert_allclose((high - low)[:2], [3.2, 2.2], rtol=0.02)
+
+
+def test_shapes_of_files_are_drawn_by_the_facets(tmp_path: Path) -> None:
+    """Where they face the body: pictures need the files of the run alone."""
+    np.save(tmp_path / "flat.npy", np.zeros((3, 3)))
+    heights = {"shape": "heights", "file": str(tmp_path / "flat.npy"), "spacing": [1.0, 0.5]}
+    run = pressed(contact={"on": "bottom", "foundation": heights})
+    (tmp_path / "flat.npy").unlink()
+    drawn = foundation(run, 1.0)
+    assert drawn.bounds == pytest.approx((0.0, 2.0, 0.0, 1.0, 0.0, 0.0), abs=1e-9)
 
 
 def test_planes_that_meet_end_there() -> None:
