@@ -157,25 +157,44 @@ def find_pair(
             "pair",
         )
     _check_apart(body, found, slave.owners, label)
-    rounding = TOUCHING * body.domain.size
-    depth, resolved = found.interference(slave.owners, added)
-    inside, beside = overlap
-    depth = max(depth, max(overlap) - max(least, 0.0))
-    # Sides that do not face each other see nothing of an overlap, nor of one beside them.
-    resolved &= inside <= 2 * found.depth and beside - max(least, 0.0) <= rounding
-    coarse = bool((alone & (found.depths > least + rounding)).any())
-    resolved &= not body.comm.allreduce(coarse, op=MPI.LOR)
-    drawn = max(found.depth, *overlap) > rounding
-    if depth > rounding and ((drawn and not press) or not resolved):
-        if drawn and _connected(body, found, slave.owners):
-            raise InputError(
-                f"{label} are sides of one body that look away from each other; accepted: parts of "
-                "two bodies whose meshes are apart",
-                "pair",
-            )
-        raise _overlap(depth, drawn, resolved, label)
+    coarse = bool((alone & (found.depths > least + TOUCHING * body.domain.size)).any())
+    resolves = not body.comm.allreduce(coarse, op=MPI.LOR)
+    _check_overlap(body, found, slave.owners, added, overlap, press, resolves, label)
     placement = PairPlacement(body, slave, master, reach, no_multiplier, found.nodes, added, press)
     return placement, placement.geometry(slave, master, found)
+
+
+def _check_overlap(
+    body: BodyEquilibrium,
+    found: Coupling,
+    owners: Owners,
+    added: Array,
+    overlap: Depths,
+    press: bool,
+    resolves: bool,
+    label: str,
+) -> None:
+    """Refuse an overlap that is not to be pressed apart, or that nodes do not resolve. Collective.
+
+    `resolves`: whether no facet without neighbours on the master overlaps it.
+    """
+    rounding = TOUCHING * body.domain.size
+    least = max(body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN), 0.0)
+    depth, resolved = found.interference(owners, added)
+    inside, beside = overlap
+    depth = max(depth, max(overlap) - least)
+    # Sides that do not face each other see nothing of an overlap, nor of one beside them.
+    resolved &= resolves and inside <= 2 * found.depth and beside - least <= rounding
+    drawn = max(found.depth, *overlap) > rounding
+    if depth <= rounding or (resolved and (press or not drawn)):
+        return
+    if drawn and _connected(body, found, owners):
+        raise InputError(
+            f"{label} are sides of one body that look away from each other; accepted: parts of "
+            "two bodies whose meshes are apart",
+            "pair",
+        )
+    raise _overlap(depth, drawn, resolved, label)
 
 
 def _refuse_shared(slave: Surface, master: Surface, label: str) -> None:

@@ -107,7 +107,87 @@ def common_points(
     """
     i, j = pairs
     own, other = _on_planes(slave, i, direction[i], (slave.points[i], master.points[j]))
-    exact = _degrees(slave, master, i, j)
+    pair, y, weight = _quadrature(slave, master, pairs, own, other)
+    i, j, own, other = i[pair], j[pair], own[pair], other[pair]
+    on_slave, on_master = (
+        pulled_back(side.shape, nodes[..., : slave.shape.dim], y)
+        for side, nodes in ((slave, own), (master, other))
+    )
+    sides = (
+        _SidePoints(master, j, on_master, direction[i], 1.0),
+        _SidePoints(slave, i, on_slave, direction[i], -1.0),
+    )
+    clear, change, curved = np.zeros((3, pair.size))
+    for side, nodes in zip(sides, (other, own), strict=True):
+        clear += side.of_facets(nodes[..., -1])
+        if side.surface.order == 1 and not side.surface.refined:
+            height = side.height()
+            curved += height
+            change += height if side.surface.follows else 0.0
+    gap = clear + change
+    depth, across = np.full(slave.count, -np.inf), np.einsum("fd,fd->f", slave.normal, direction)
+    np.maximum.at(depth, i, -_least_distance(clear, gap, sides) * across[i])
+    bears = weight != 0
+    weight = weight[bears] * _measure(slave, i[bears], on_slave[bears], own[bears])
+    gaps = gap[bears], (clear + curved)[bears]
+    return Points(i[bears], j[bears], on_slave[bears], on_master[bears], weight, *gaps, depth)
+
+
+@dataclass(frozen=True)
+class _SidePoints:
+    """Points on the facets of one side, and the directions of the rays through them."""
+
+    surface: Surface
+    facets: NDArray[np.intp]  #: the facet of each point, shape (p,)
+    at: Array  #: points of the reference facets, shape (p, dim)
+    direction: Array  #: shape (p, d)
+    sign: float  #: 1 for the master, -1 for the slave: gaps are the sums of both
+
+    def of_facets(self, heights: Array) -> Array:
+        """Return signed heights of the facets, given those at their nodes, (p, k)."""
+        functions = self.surface.shape.lagrange(self.surface.order, self.at)
+        return self.sign * np.einsum("pk,pk->p", functions, heights)
+
+    def height(self) -> Array:
+        """Return signed distances of the curved surface from the facets, shape (p,)."""
+        return self.sign * self.surface.distance(self.facets, self.at, self.direction)
+
+    def most(self, some: NDArray[np.intp]) -> Array:
+        """Return upper bounds of `height` at some of the points."""
+        facets, at, direction = self.facets[some], self.at[some], self.direction[some]
+        bounds = self.surface.distance_bounds(facets, at, direction)
+        return np.maximum(*(self.sign * bound for bound in bounds))
+
+
+def _least_distance(clear: Array, gap: Array, sides: Sequence[_SidePoints]) -> Array:
+    """Return the distances of facets, below 0 by as much as no curvature explains, shape (p,)."""
+    apart, cut = np.maximum(clear, gap), np.flatnonzero(clear < 0)
+    most = sum(side.most(cut) for side in sides)
+    apart[cut] = np.minimum(clear[cut] + np.maximum(most, 0.0), 0.0)
+    return apart
+
+
+def _measure(slave: Surface, facets: NDArray[np.intp], at: Array, nodes: Array) -> Array:
+    """Return lengths or areas on slave facets, or their rings, by those on the planes, (p,)."""
+    gradients, d = slave.shape.gradients(slave.order, at), slave.shape.dim
+    turned = np.einsum("pkr,pkd->pdr", gradients, nodes[..., :d])
+    size = np.linalg.norm(area_vectors(slave.slopes(facets, at)), axis=1)
+    size /= np.abs(determinant(turned))
+    if slave.revolved:
+        functions = slave.shape.lagrange(slave.order, at)
+        size *= 2 * np.pi * np.einsum("pk,pk->p", functions, slave.points[facets, :, 0])
+    return np.asarray(size)
+
+
+def _quadrature(
+    slave: Surface,
+    master: Surface,
+    pairs: tuple[NDArray[np.intp], NDArray[np.intp]],
+    own: Array,
+    other: Array,
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return pair, point on the plane and weight of all quadrature points, ascending by pair."""
+    exact = _degrees(slave, master, *pairs)
     none = np.zeros(0, dtype=np.intp), np.zeros((0, slave.shape.dim)), np.zeros(0)
     found: list[tuple[NDArray[np.intp], Array, Array]] = [none]
     for degree in np.unique(exact):
@@ -120,38 +200,7 @@ def common_points(
         found += [(chosen[pair], y, weight) for pair, y, weight in parts]
     pair, y, weight = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
     order = np.argsort(pair, kind="stable")
-    pair, y, weight = pair[order], y[order], weight[order]
-    on_slave, on_master = (
-        pulled_back(side.shape, nodes[pair][..., : slave.shape.dim], y)
-        for side, nodes in ((slave, own), (master, other))
-    )
-    sides = (1.0, master, j, on_master, other), (-1.0, slave, i, on_slave, own)
-    clear, change, curved = np.zeros((3, pair.size))
-    for sign, side, facets, at, nodes in sides:
-        functions = side.shape.lagrange(side.order, at)
-        clear += sign * np.einsum("pk,pk->p", functions, nodes[pair, :, -1])
-        if side.order == 1 and not side.refined:
-            height = sign * side.distance(facets[pair], at, direction[i[pair]])
-            curved += height
-            change += height if side.follows else 0.0
-    gap, curved, cut = clear + change, clear + curved, np.flatnonzero(clear < 0)
-    apart, most, there = np.maximum(clear, gap), np.zeros(cut.size), pair[cut]
-    for sign, side, facets, at, _ in sides:
-        bounds = side.distance_bounds(facets[there], at[cut], direction[i[there]])
-        most += np.maximum(*(sign * bound for bound in bounds))
-    apart[cut] = np.minimum(clear[cut] + np.maximum(most, 0.0), 0.0)
-    depth, across = np.full(slave.count, -np.inf), np.einsum("fd,fd->f", slave.normal, direction)
-    np.maximum.at(depth, i[pair], -apart * across[i[pair]])
-    bears = weight != 0
-    pair, on_slave, on_master = pair[bears], on_slave[bears], on_master[bears]
-    weight, gap, curved = weight[bears], gap[bears], curved[bears]
-    gradients, d = slave.shape.gradients(slave.order, on_slave), slave.shape.dim
-    slopes, turned = slave.slopes(i[pair], on_slave), _slopes(gradients, own[pair, :, :d])
-    size = np.linalg.norm(area_vectors(slopes), axis=1) / np.abs(determinant(turned))
-    if slave.revolved:
-        functions = slave.shape.lagrange(slave.order, on_slave)
-        size *= 2 * np.pi * np.einsum("pk,pk->p", functions, slave.points[i[pair], :, 0])
-    return Points(i[pair], j[pair], on_slave, on_master, weight * size, gap, curved, depth)
+    return pair[order], y[order], weight[order]
 
 
 def _on_planes(
@@ -261,7 +310,3 @@ def _within(begin: Array, along: Array, polygons: Array) -> tuple[Array, Array, 
     on_edge = (level & (np.abs(height) <= ROUNDING)).any(axis=1)
     zero, share = np.zeros(len(begin)), np.where(on_edge, 0.5, 1.0)
     return np.maximum(low, zero), np.where(beyond, zero, np.minimum(high, 1.0)), share
-
-
-def _slopes(gradients: Array, nodes: Array) -> Array:
-    return np.asarray(np.einsum("pkr,pkd->pdr", gradients, nodes))
