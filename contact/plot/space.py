@@ -345,6 +345,7 @@ class Scene:
         plotter.add_scalar_bar(label, color="black", n_labels=5)
         plotter.add_axes(color="black")
         Camera.of(self.zone.normal + USUAL, np.asarray(self.body.points)).aim(plotter)
+        plotter.reset_camera(render=False)  # all of it, as wide as the window may be
         return plotter
 
 
@@ -457,9 +458,13 @@ def close_camera(zone: Zone, side: int, whole: Camera) -> Camera:
 
     In coordinate planes upwards along the axis that is nearest to it.
     """
-    above = whole.up - (whole.up @ zone.normal) * zone.normal
+    along = side * float(whole.up @ zone.normal)
+    above = whole.up - side * along * zone.normal
+    if np.linalg.norm(above) < 0.3:  # the body is seen edge-on: as its camera would turn
+        above = -np.copysign(1.0, along) * whole.view
     if abs(zone.normal).max() == 1:
-        above = np.sign(above) * (abs(above) == abs(above).max())
+        k = int(np.argmax(abs(above)))
+        above = np.sign(above[k]) * np.eye(3)[k]
     facing = (zone.area @ zone.normal) * side > 0
     return Camera.of(side * zone.normal, zone.corners[facing].reshape(-1, 3), ROOM, above)
 

@@ -55,6 +55,11 @@ def test_the_camera_sees_the_contact(side: str) -> None:
     close = close_camera(zone, 1, whole)
     np.testing.assert_array_equal(close.view, outward)
     assert close.up @ whole.up > 0.5
+    # Where the body is seen edge-on too.
+    across = np.roll(outward, 1)
+    edge = Camera.of(across, run.body.points, above=outward)
+    close = close_camera(zone, 1, edge)
+    np.testing.assert_array_equal([close.view, close.up], [outward, -across])
 
 
 def test_the_other_body_is_translucent_or_both_are_cut_open() -> None:
