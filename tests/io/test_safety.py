@@ -106,23 +106,6 @@ def test_a_full_disk_keeps_the_earlier_results(ranks: int, good: Path, small_dis
 
 
 @RANKS
-def test_a_mesh_from_elsewhere_executes_nothing(ranks: int, tmp_path: Path) -> None:
-    """Gmsh would take it for a script, where a case is but looked at."""
-    mark, mesh = tmp_path / "executed", tmp_path / "body.msh"
-    mesh.write_text(f'// $MeshFormat 2.2\nSystemCall "touch {mark}";\n')
-    lines = BAR.read_text().splitlines()
-    start, end = lines.index("[mesh]"), lines.index("[material]")
-    lines[start:end] = ["[mesh]", f'file = "{mesh}"']
-    (tmp_path / "case.toml").write_text("\n".join(lines))
-    started = command("check", str(tmp_path / "case.toml"), ranks=ranks)
-    done = subprocess.run(started, env=environment(), capture_output=True, text=True, timeout=120)
-    assert done.returncode == 2
-    (message,) = messages(done.stderr)
-    assert "no Gmsh .msh file" in message
-    assert not mark.exists()
-
-
-@RANKS
 @pytest.mark.slow
 def test_sigterm_while_writing_leaves_one_of_the_runs_whole(
     ranks: int, good: Path, tmp_path: Path

@@ -1,5 +1,7 @@
 """Cook's membrane: a tapered panel, clamped at one end and sheared at the other."""
 
+from dataclasses import replace
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -10,19 +12,23 @@ from petsc4py import PETSc
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.history import BodyState
-from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed
 from forms.hencky import Linear
 
 
-def cook(cells, degree, element="standard", cell="triangle", poisson=0.4999):
-    """Return the rise of the upper corner of Cook's membrane, E = 1, traction 1/16 up."""
-    plane = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (1.0, 1.0), (cells, cells), cell=cell)
-    x = plane.mesh.geometry.x
+def membrane(cells, cell="triangle"):
+    """Return the trapezoid of corners (0, 0), (48, 44), (48, 60) and (0, 44). Collective."""
+    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (1.0, 1.0), (cells, cells), cell=cell)
+    x = domain.mesh.geometry.x
     x[:, 1] = 44 * x[:, 0] + x[:, 1] * (44 - 28 * x[:, 0])
     x[:, 0] *= 48
-    domain = from_mesh(plane.mesh, plane.parts)
+    return replace(domain, size=60.0)
+
+
+def cook(cells, degree, element="standard", cell="triangle", poisson=0.4999):
+    """Return the rise of the upper corner of Cook's membrane, E = 1, traction 1/16 up."""
+    domain = membrane(cells, cell)
     described = Body(Linear(1.0, poisson), Fixed("left", [0, 0]))
     body = BodyEquilibrium(domain, described, degree, element)
     matrix = body.create_matrix()

@@ -1,6 +1,6 @@
 """Plane stress: a strip, a plate with a hole's ring, Cook's membrane, plasticity, a ceramic."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +11,6 @@ from scipy.optimize import brentq
 from contact import Body, Contact, Fixed, Linear, Load, Log, Material, Problem, parse_case, solve
 from contact.case.build import build_problem
 from contact.errors import InputError
-from contact.mesh.grid import rectangle
 from contact.results.fields import DerivedFields
 from forms.hencky import Isotropic
 from forms.history import Response, differential, isotropic_stiffness
@@ -19,6 +18,7 @@ from forms.j2 import J2, Voce
 from forms.plane_stress import ACROSS, HenckyAtPoints, PlaneStressHistory, in_plane_stress
 from tests.body.test_rollers import sector
 from tests.problem.test_electrodes_inside import BETA33, C11, C13, C33, CERAMIC, E31, E33
+from tests.problems.membrane import membrane
 
 COMM = MPI.COMM_WORLD
 YOUNG, POISSON = 200.0, 0.3
@@ -117,21 +117,12 @@ def test_a_ring_pressed_inside_is_lames_in_plane_stress():
     assert np.log2(off[0] / off[1]) > 1.8  # straight edges of a circle
 
 
-def membrane(comm, count):
-    """Return Cook's: a trapezoid of corners (0, 0), (48, 44), (48, 60) and (0, 44)."""
-    domain = rectangle(comm, (0.0, 0.0), (1.0, 1.0), (count, count), cell="quadrilateral")
-    x = domain.mesh.geometry.x
-    a, b = x[:, 0].copy(), x[:, 1].copy()
-    x[:, 0], x[:, 1] = 48 * a, 44 * a + b * (44 - 28 * a)
-    return replace(domain, size=60.0)
-
-
 @pytest.mark.parallel(2)
 def test_cooks_membrane():
     """E = 1, nu = 1/3, a shear of 1: the middle of the end rises by 23.96 (Cook 1974; Bergan)."""
     material = Material(Linear(1.0, 1 / 3)).plane_stress()
     body = Body(material, Fixed("left", [0.0, 0.0]), Load("right", traction=[0.0, 1 / 16]))
-    solution = solve(Problem(membrane(COMM, 16), body, Contact("top", 1e3), degree=2))
+    solution = solve(Problem(membrane(16, "quadrilateral"), body, Contact("top", 1e3), degree=2))
     equilibrium = solution.problem.body
     u = equilibrium.nodal(solution.state.x)[: equilibrium.owned // 2, 1]
     end = np.all(np.isclose(equilibrium.layout.points, [48.0, 52.0]), axis=1)
