@@ -20,7 +20,6 @@ from contact.model.obstacle import GapFunction
 from contact.problem.checks import check_rigid_modes
 from contact.problem.problem import ContactProblem
 from contact.results.contact_nodes import contact_table
-from contact.results.resultants import charge_balance
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks
@@ -203,58 +202,12 @@ def test_two_pairs_have_two_laws():
     assert set(table["status"][above]) == {"open", "slip"}
 
 
-#: Two columns on each other: heights 1, permittivities, conductance of the contact, voltage.
-PERMITTIVITIES, CONDUCTANCE, VOLTAGE = (2.0, 5.0), 0.7, 3.0
-
-
-def columns(on, against, degree, **electric):
-    materials = []
-    for name, beta in zip(("upper", "lower"), PERMITTIVITIES, strict=True):
-        piezo = {"e31": 0.0, "e33": 0.0, "e15": 0.0, "beta11": beta, "beta33": beta}
-        materials.append({"on": name, "young": 100.0, "poisson": 0.3, "piezo": piezo})
-    roller = [0.0, "free"]
-    return {
-        "mesh": {
-            "generator": "two_blocks",
-            "upper_width": 1.0,
-            "lower_width": 1.0,
-            "upper_size": 0.35,
-            "lower_size": 0.22,
-        },
-        "space": {"degree": degree},
-        "material": materials,
-        "fixed": [
-            {"on": "lower_bottom", "displacement": ["free", 0.0], "potential": 0.0},
-            {"on": "upper_top", "displacement": ["free", -0.01], "potential": VOLTAGE},
-            {"on": "lower_left", "displacement": roller},
-            {"on": "upper_left", "displacement": roller},
-        ],
-        "contact": {
-            "on": on,
-            "against": against,
-            "electric": {"law": "perfect", "k_e": CONDUCTANCE, **electric},
-        },
-        "solver": {"tolerance": 1e-11},
-    }
-
-
-@pytest.mark.core
-@pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("pair", [("upper_bottom", "lower_top"), ("lower_top", "upper_bottom")])
-def test_columns_in_series(pair, degree):
-    """I = V/(H1/b1 + 1/k + H2/b2): what leaves the one body enters the other."""
-    solution = solve(parse_case(columns(*pair, degree)))
-    assert solution.converged
-    current = VOLTAGE / (1 / PERMITTIVITIES[0] + 1 / CONDUCTANCE + 1 / PERMITTIVITIES[1])
-    found = charge_balance(solution.problem, solution.state)
-    assert found.electrodes["lower_bottom"] == pytest.approx(current, rel=1e-10)
-    assert found.electrodes["upper_top"] == pytest.approx(-current, rel=1e-10)
-    assert abs(found.foundation) < 1e-12 * current and found.imbalance < 1e-12
-
-
 def test_a_foundation_of_its_own_potential_is_no_body():
+    electric = {"law": "perfect", "k_e": 0.7, "phi_f": 2.0}
+    piezo = {"e31": 0.0, "e33": 0.0, "e15": 0.0, "beta11": 2.0, "beta33": 2.0}
+    pair = {"on": "upper_bottom", "against": "lower_top", "electric": electric}
     with pytest.raises(InputError, match=r"contact\.electric\.phi_f.*\[value\]"):
-        parse_case(columns("upper_bottom", "lower_top", 1, phi_f=2.0))
+        parse_case(case(contact=pair, material={"young": 1.0, "poisson": 0.3, "piezo": piezo}))
 
 
 @pytest.mark.parallel

@@ -25,7 +25,12 @@ SELF = MPI.COMM_SELF
 VOLTS, CONDUCTANCE, UPPER, LOWER = 3.0, 2.0, 0.5, 4.0
 
 
-def columns(electrode: float | None = None, conductance: float = CONDUCTANCE) -> ContactProblem:
+def columns(
+    electrode: float | None = None,
+    conductance: float = CONDUCTANCE,
+    degree: int = 1,
+    pair: tuple[str, str] = ("under", "over"),
+) -> ContactProblem:
     """Return two blocks of height and width 1 without coupling, pressed onto each other.
 
     Parameters
@@ -34,6 +39,10 @@ def columns(electrode: float | None = None, conductance: float = CONDUCTANCE) ->
         Charge of the upper electrode; None where that is held at `VOLTS`.
     conductance
         Of what is between them.
+    degree
+        Of displacements and potential.
+    pair
+        Sides of the upper and the lower block, the slave side first.
     """
     still = [constant(0.0, 2), constant(0.0, 2)]
     down = [constant(0.0, 2), constant(-0.01, 2)]
@@ -52,8 +61,8 @@ def columns(electrode: float | None = None, conductance: float = CONDUCTANCE) ->
     law = PerfectConductivity(conductance)
     conducts = law if electrode is None else ShiftedConductivity(conductance, 1e3)
     conductor = Conductor(conducts, 0.0, Truncation(np.inf))
-    contact = Contact("under", flat(), conductor=conductor, against="over")
-    return ContactProblem(Blocks(jitter=0.1).domain(SELF), body, contact)
+    contact = Contact(pair[0], flat(), conductor=conductor, against=pair[1])
+    return ContactProblem(Blocks(jitter=0.1).domain(SELF), body, contact, degree=degree)
 
 
 def solved(problem, method):
@@ -63,10 +72,12 @@ def solved(problem, method):
 
 
 @pytest.mark.core
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("pair", [("under", "over"), ("over", "under")])
 @pytest.mark.parametrize("how", ["condensed", "whole", "uzawa"])
-def test_columns_in_series(how):
+def test_columns_in_series(how, pair, degree):
     """I = V/(H_1/beta_1 + 1/k + H_2/beta_2), and what leaves one body enters the other."""
-    problem = columns()
+    problem = columns(degree=degree, pair=pair)
     if how == "uzawa":
         method = FixedPoint(problem, FixedPointOptions(tolerance=1e-11))
     else:
@@ -77,6 +88,7 @@ def test_columns_in_series(how):
     assert abs(charges.electrodes["top"]) == pytest.approx(current, rel=1e-10)
     lost = charges.electrodes["top"] + charges.electrodes["bottom"]
     assert abs(lost) < 1e-12 * current
+    assert abs(charges.foundation) < 1e-12 * current and charges.imbalance < 1e-12
     points, phi = problem.body.layout.points, problem.body.nodal(state.x)[:, 2]
     volts = problem.body.phi_scale * phi
     upper = points[:, 1] > 1.5
