@@ -1,12 +1,10 @@
-"""Load steps and their checkpoints on any number of ranks."""
+"""Load steps on any number of ranks."""
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact import solve
-from contact.cli.solve import solve_and_keep
-from contact.ranks import on_root
 from contact.results.quantities import values_of
 from contact.results.quantity import NODES
 from tests.results.test_steps import case_of
@@ -38,28 +36,7 @@ def agree(some, others):
 
 @pytest.mark.core
 @pytest.mark.parametrize("law", LAWS)
-def test_the_ranks_do_not_matter(law, comm, shared_tmp_path):
-    """From rest; and from the checkpoints of a run on one rank, and back."""
+def test_the_ranks_do_not_matter(law, comm):
     case = case_of(**LAWS[law])
-    alone = solve(case, comm=MPI.COMM_SELF)
-    together = solve_and_keep(case, None, comm, shared_tmp_path)
-    known = tables(alone)
-    agree(tables(together), known)
-
-    folder = shared_tmp_path / "one"
-    if comm.rank == 0:
-        folder.mkdir()
-        solve_and_keep(case, None, MPI.COMM_SELF, folder)
-        for later in (4, 5):
-            (folder / "checkpoints" / f"0000{later}.npz").unlink()
-    comm.barrier()
-    resumed = solve_and_keep(case, None, comm, folder, folder)
-    agree(tables(resumed), known)
-    assert len(resumed.history) < len(together.history)
-
-    def back() -> list:
-        for later in (3, 4, 5):
-            (shared_tmp_path / "checkpoints" / f"0000{later}.npz").unlink()
-        return tables(solve_and_keep(case, None, MPI.COMM_SELF, shared_tmp_path, shared_tmp_path))
-
-    agree(on_root(comm, back), known)
+    alone, together = solve(case, comm=MPI.COMM_SELF), solve(case, comm=comm)
+    agree(tables(together), tables(alone))
