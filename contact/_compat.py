@@ -63,7 +63,10 @@ def original_cells(mesh: Mesh) -> npt.NDArray[np.int64]:
 
 
 def facet_entities(mesh: Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """Return exterior facets as flat pairs (cell, local facet); cells and facets are connected."""
+    """Return exterior facets as pairs (cell, facet of the cell), flat, to integrate over.
+
+    The mesh must have the connectivities of facets to cells and back.
+    """
     compute = fem.compute_integration_domains
     # The dimension of the entities is an argument up to 0.9 only.
     dim = (mesh.topology.dim - 1,) if "dim" in inspect.signature(compute).parameters else ()
@@ -109,7 +112,10 @@ def surface(grid: Any) -> Any:
 
 
 def keeps_inverted_blocks() -> bool:
-    """Whether PETSc (from 3.25 on) keeps outdated inverted blocks (pbjacobi) of a matrix."""
+    """Whether PETSc keeps the inverted nodal blocks of a matrix whose values have changed.
+
+    Since 3.25 MatInvertBlockDiagonal, and with it the preconditioner pbjacobi, does not renew them.
+    """
     return bool(PETSc.Sys.getVersion() >= (3, 25))
 
 

@@ -102,7 +102,11 @@ class Returned(InputError):
 
 
 def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
-    """Return values, broadcast to a shape, inside `naming`; `each`: the accepted ones in words."""
+    """Return the values of a user's function as an array of a shape, by broadcasting.
+
+    Values that do not fit raise `Returned`, to which `naming` adds the name of the function; `each`
+    has the accepted values in words.
+    """
     if type(values) is np.ndarray and values.dtype == float and values.shape == shape:
         return values.copy()
     try:
@@ -197,7 +201,8 @@ def check_slope(
 ) -> None:
     """Compare a derivative with central differences at arguments other than 0, shape (n,).
 
-    InputError, with `name`, if they differ at `SHARE` of the samples or more, or there is none.
+    InputError, with `name`, if they differ at a share `SHARE` of the samples or more, or if the law
+    has no derivative.
     """
     h = STEP * np.abs(at)
     every = sampled(

@@ -129,8 +129,8 @@ def neighbours(
     """Return values at points of any rank in the bounding box of this one's. Collective.
 
     Points (n, d) and values (n, k) are those of this rank; the box is that of the points `asked`
-    (by default all of them), enlarged by `reach` (length). Shape (near, k), in the order of the
-    ranks.
+    (by default all of them), enlarged by `reach` (length). The result has the shape (near, k), in
+    the order of the ranks.
     """
     rows = [
         np.flatnonzero(np.all((points >= lower - reach) & (points <= upper + reach), axis=1))

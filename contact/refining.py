@@ -147,7 +147,10 @@ def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State
 
 
 def _interpolate(nodes: ContactNodes, values: Array, at: Array) -> Array:
-    """Interpolate the d nearest nodes by inverse distance (linear on nested edges). Collective."""
+    """Interpolate between the d nearest nodes, weighted by the inverse of the distance. Collective.
+
+    On nested edges that is linear interpolation.
+    """
     rows, d = np.column_stack([nodes.points, values]), nodes.dim
     nearest = np.arange(1, min(d, nodes.size) + 1)
     # No multiple of the spacing, at which rounding would choose the ranks that send a row of nodes.

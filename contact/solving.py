@@ -256,9 +256,10 @@ def solve_problem(
     """Solve a problem in one step or in several; `reviewed` gives the warnings. Collective.
 
     A signal or a step that fails ends the steps; all complete ones remain, with the outcome of the
-    one that has ended them. `start` (None for zero), named by `guess`, is for a single step;
-    `times` are begin and ends of load steps. `kept` are the records of the steps of an earlier run,
-    to continue from, and `keep` is called with that of each step.
+    one that has ended them. `start` is the initial guess of a single step, None for zero, and
+    `guess` its name in messages. `times` are begin and ends of the load steps; none for a single
+    step to the problem's own time. `kept` are the records of the steps of an earlier run, to
+    continue from, and `keep` is called with that of each step.
     """
     clock = time.perf_counter()
     check_variables(problem.body)
@@ -418,7 +419,11 @@ def _checked(
 def _checked_times(
     problem: ContactProblem, times: Sequence[float] | Array, begin: float
 ) -> tuple[float, ...]:
-    """Return ends of steps, which increase; refuse contradictory supports. Collective."""
+    """Return the ends of steps; refuse times that do not increase. Collective.
+
+    Supports that contradict each other at one of them, and a problem that `check_problem` refuses
+    at the last, are refused too.
+    """
     given = [*times] if isinstance(times, Iterable) and not isinstance(times, str) else []
     numbers = len(given) > 0 and all(isinstance(time, Real) for time in given)
     expect("times", times, "a list of times, the ends of the steps", numbers)

@@ -181,10 +181,10 @@ class Assembly:
         return found
 
     def border(self, kind: str, owned: int, size: int) -> tuple[Array, Array] | None:
-        """Return the derivatives by global unknowns; None without cuts. Collective.
+        """Return the derivatives by the m = `size` global unknowns; None without cuts. Collective.
 
-        Those of the forces on the nodes, shape (owned, m), and on the global unknowns, (m, m).
-        `kind` is "secant", or of the law itself.
+        These are those of the forces on the nodes, shape (owned, m), and on the global unknowns,
+        (m, m), by the secant modulus if `kind` is "secant", else by the law itself.
         """
         if self._cuts is None:
             return None

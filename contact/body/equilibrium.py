@@ -441,8 +441,8 @@ class BodyEquilibrium:
     ) -> SparseOperator | TransformedOperator:
         """Return the operator of the body with blocks at nodes, as `SparseOperator`.
 
-        The nodes are contact nodes, then others, by local numbers. The transformation makes blocks
-        those of single nodes; None if they are so without.
+        The nodes are contact nodes, then others, by local numbers. After the transformation each
+        block belongs to a single node; it is None where that is so without one.
         """
         options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "solver": solver}
         if transformation is None:

@@ -386,8 +386,8 @@ class Cuts:
     def check(self, nodes: NDArray[np.int32], along: Array, text: str) -> None:
         """Refuse a constraint across a cut, where the displacement is that of one side. Collective.
 
-        It is one of owned nodes, shape (n,), along directions, (n, d, k); `text` are words for the
-        message.
+        The constraint acts at owned nodes, shape (n,), in k directions, shape (n, d, k); `text` has
+        words on it for the message.
         """
         for part, (ends, normal) in zip(self.parts, self._ends, strict=True):
             here = np.einsum("nik,i->nk", along[np.isin(nodes, ends)], normal)

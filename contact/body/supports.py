@@ -71,8 +71,8 @@ class Support:
 def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Support]:
     """Return a body's supports, one a component, and u_r = 0 on an axis of revolution. Collective.
 
-    Refuses missing parts, vectors of the wrong length, a potential prescribed for a body without,
-    and a radial displacement prescribed on the axis.
+    Refuses missing parts, vectors of the wrong length, a potential prescribed for a body without
+    one, and a radial displacement prescribed on the axis.
     """
     supports, dim = [], domain.dim
     domain.mesh.topology.create_connectivity(dim - 1, dim)

@@ -28,8 +28,9 @@ MANNER = frozenset({"title", "case", "solver", "output"})
 def digest(case: Case) -> dict[str, str]:
     """Return the SHA-256 of each file that a case reads. On one rank.
 
-    By the keys of the files (``mesh.file``, ``contact.foundation.file``, ``material.0.library``);
-    of a file that a mesh file refers to by its name, too (``mesh.file/part.h5``).
+    The keys are those of the files (``mesh.file``, ``contact.foundation.file``,
+    ``material.0.library``), with the name of a file that a mesh file refers to
+    (``mesh.file/part.h5``). InputError if a file cannot be read.
     """
     given = [(key, Path(value)) for key, value in walk(case) if isinstance(value, FilePath)]
     for key, material in case.materials:

@@ -252,7 +252,10 @@ class Mesh(Section):
         return self.origin, self.size, self.cells, self.pieces
 
     def build(self, comm: MPI.Intracomm) -> Domain:
-        """Make the mesh with its parts; InputError if it does not fit into memory. Collective."""
+        """Make the mesh with its parts. Collective.
+
+        InputError if a file or generator gives no mesh, or if it does not fit into the memory.
+        """
         read = None if self.sides else self._read(comm)
         dim = len(self.sides) // 2 if read is None else read.dim
         cells = self._planned if read is None else read.mesh.topology.index_map(dim).size_global

@@ -253,7 +253,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Family:
-    """Problems at differences `ways` of a parameter; quotients are sum factors * values / over."""
+    """Problems at the differences `ways` from a parameter's value.
+
+    The difference quotient of values at the problems is sum factors * values / over.
+    """
 
     problems: tuple[ContactProblem, ...]
     ways: tuple[float, ...]
@@ -379,7 +382,10 @@ def at(problem: ContactProblem, state: State) -> tuple[ContactProblem, State]:
 
 
 class LoadPath:
-    """The load steps of a solution; InputError if not converged, or if there are no derivatives."""
+    """The load steps of a solution.
+
+    InputError if it has not converged, or its equations have no derivatives here.
+    """
 
     def __init__(self, solution: Solution) -> None:
         expect("solution", solution, "a Solution", isinstance(solution, Solution))

@@ -191,7 +191,7 @@ class Interface:
     ) -> ActiveSet:
         """Return the active set: open, stick, slip.
 
-        `c` and `rounding` are those of `constraint_active`; c_0 by default.
+        `c` (c_0 by default) and `rounding` are those of `constraint_active`.
         """
         c = self.c_0 if c is None else c
         closed = constraint_active(multipliers.contact, self.normal_gap(jump), c, rounding)
@@ -229,7 +229,8 @@ class Interface:
     def add_forces(self, residual: Array, x: Array, multipliers: Multipliers) -> None:
         """Add the forces T^T W (lambda + p_l nu, -D.nu) at local unknowns to owned values.
 
-        lambda of contact and friction, p_l of the layer, D.nu the charge, 0 of an insulator.
+        lambda is the contact stress of the multipliers, p_l the pressure of the layer, and D.nu the
+        charge, 0 of an insulator.
         """
         nodes, jump = self.nodes, self.nodes.jump(x)
         density = self.foundation.force(jump, self.pressure(jump, multipliers))
@@ -263,8 +264,8 @@ class Interface:
     def weighted(self, blocks: Array, x: Array) -> Array:
         """Return blocks at `operator_nodes`: those of the contact nodes, times their areas.
 
-        The given ones are derivatives of nodal forces, shape (n, block size, block size), without
-        weights.
+        The given `blocks` are derivatives of nodal forces at the contact nodes, without weights,
+        shape (n, block size, block size).
         """
         if self.proximal is not None:
             blocks = blocks.copy()

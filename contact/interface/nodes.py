@@ -218,8 +218,8 @@ def joined_nodes(
 ) -> ContactNodes:
     """Return the nodes of all contacts, one contact after the other. Collective.
 
-    Refuses contacts that share nodes, nodes on both sides of pairs of bodies, and nodes on a roller
-    whose jump is a sum. `parts` are the names of the parts that the nodes are of.
+    `parts` are the names of the parts that the nodes are of. Refuses contacts that share nodes,
+    nodes on both sides of pairs of bodies, and nodes on a roller if their jump is a sum over nodes.
     """
     _refuse_shared(geometries, parts)
     pieces = [geometry.nodes for geometry in geometries]

@@ -48,10 +48,10 @@ def overlap_depths(
 ) -> tuple[list[Depths], Unpaired]:
     """Return how deep bodies lie in each other. Collective.
 
-    `pairs` are both parts of each, and whether it presses overlaps apart. The first result are the
+    `pairs` are both parts of each, and whether it presses overlaps apart. The first result has the
     largest depths that curvature does not explain (length), 0 for rounding, of the bodies of each
-    pair: at its sides, but where another pair presses, and where there is no side of any pair; the
-    second are those above rounding of bodies that no pair keeps apart.
+    pair: at its sides, but where another pair presses, and where there is no side of any pair. The
+    second has the depths above rounding of bodies that no pair keeps apart.
     """
     if body.components[1] == 1:
         return [(0.0, 0.0)] * len(pairs), {}
@@ -88,11 +88,11 @@ class _Boundaries:
     """The boundaries of all bodies, which are the connected components of the mesh."""
 
     body: BodyEquilibrium
-    facets: NDArray[np.int32]  #: of the boundary, owned, but on the axis of revolution, shape (f,)
+    facets: NDArray[np.int32]  #: owned, of the boundary without the axis of revolution, (f,)
     surface: Surface  #: of these facets
     component: Numbers  #: of each facet, shape (f,)
     parts: Sequence[tuple[str, str]]  #: both parts of each pair
-    sides: NDArray[np.bool_]  #: which facets are on either, shape (f, pairs, 2)
+    sides: NDArray[np.bool_]  #: which facets are on either part, shape (f, pairs, 2)
     bodies: NDArray[np.bool_]  #: which components each side is of, shape (pairs, 2, components)
 
     @staticmethod

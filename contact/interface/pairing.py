@@ -45,8 +45,8 @@ class PairPlacement:
     master: Surface  #: the master side, likewise
     reach: float  #: largest distance at which facets face each other (length)
     no_multiplier: NDArray[np.int64]  #: global numbers of slave nodes without multiplier (`couple`)
-    nodes: NDArray[np.int64]  #: of those of this rank with one, shape (n,)
-    added: Array  #: added to the gap between the meshes, at these nodes, shape (n,) (length)
+    nodes: NDArray[np.int64]  #: global numbers of this rank's nodes with a multiplier, (n,)
+    added: Array  #: gap at `nodes` beside that between the meshes, shape (n,) (length)
     press: bool  #: whether overlaps in the reference configuration are interferences
 
     def at(self, displacement: Array) -> Geometry:

@@ -232,8 +232,9 @@ def find_nodes(
     that are held is borne by the supports. Friction acts along the directions of
     `ContactNodes.tangent`.
 
-    With `press` a shape may cut the body in the reference configuration, to which the geometry that
-    is returned belongs. Where the foundation `conducts`, nodes that cannot move carry charge too.
+    With `press` a shape may cut the body in the reference configuration. Where the foundation
+    `conducts`, nodes that cannot move carry charge too. The geometry that is returned is that of
+    the reference configuration.
 
     Refuses a part without a contact node on any rank, or without one that sees the foundation;
     nodes without a contact direction, or with a gap that is no number; and foundations that lie

@@ -90,7 +90,10 @@ def _frames(solution: Solution) -> list[Frame]:
 
 
 def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> None:
-    """Write main fields and contact part of each step, with ``fields.pvd`` and ``contact.pvd``."""
+    """Write main fields and contact part of each step, and the lists of these files.
+
+    The lists are ``fields.pvd`` and ``contact.pvd``.
+    """
     problem = solution.problem
     derived = DerivedFields(problem.body, frames[0][1])
     names = (*SERIES, *problem.body.laws.names)
@@ -121,7 +124,10 @@ def body_share(
     names: Collection[str] | None = None,
     derived: DerivedFields | None = None,
 ) -> Grid:
-    """Return this rank's share of a body at a state with its fields of some names. Collective."""
+    """Return this rank's share of a body at a state with its fields of some names. Collective.
+
+    Without `names` it has all fields; `derived` are the derived fields at the state, if at hand.
+    """
     body, d = problem.body, problem.dim
     space, derived = body.space, derived or DerivedFields(body, state)
     links, index_map = space.dofmap.list, space.dofmap.index_map
@@ -277,7 +283,10 @@ def gathered(comm: MPI.Intracomm, share: Grid) -> Grid | None:
 
 
 def write_vtu(path: Path, grid: Grid) -> None:
-    """Write a file, vectors in 3-D; VTK's own writer may crash on full disks. On one rank."""
+    """Write a file; vectors of the plane get a third component 0. On one rank.
+
+    VTK's own writer may crash where the disk is full.
+    """
     count = grid.cells.shape[1]
     kind, order = grid.shape.vtk(grid.shape.degree_of(count))
     cells = {

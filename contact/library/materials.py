@@ -139,7 +139,10 @@ def _electric(table: Mapping[str, Any]) -> tuple[Array, Array]:
 
 @cache
 def library(path: Path = PACKAGED) -> Mapping[str, Entry]:
-    """Read a library: name -> entry, in the order of the file; InputError names a wrong entry."""
+    """Read a library: name -> entry, in the order of the file.
+
+    InputError if the file cannot be read, or with the name of an entry that is wrong.
+    """
     found = {}
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -167,7 +170,10 @@ def library(path: Path = PACKAGED) -> Mapping[str, Entry]:
 
 
 def find(name: str, path: Path = PACKAGED) -> Entry:
-    """Return a material by its name; an InputError names the nearest one."""
+    """Return a material by its name.
+
+    InputError as of `library`, and if there is no such material, with the nearest name.
+    """
     known = library(path)
     if name in known:
         return known[name]

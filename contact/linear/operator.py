@@ -312,7 +312,8 @@ class SparseOperator:
         """Solve for an owned right-hand side; fixed unknowns stay 0. Collective.
 
         `rtol` is the relative tolerance of an iterative solver, its own by default, and `guess` its
-        initial guess, zero by default. Refuses singular operators, and numbers that overflow.
+        initial guess, zero by default. SingularError if the operator is singular, InputError if its
+        numbers overflow or the memory is too small.
         """
         self._rhs.array[:] = self.layout.mask(rhs)
         self.ksp.setTolerances(rtol=self._tolerance if rtol is None else rtol)

@@ -164,7 +164,7 @@ def refine(
 
     The norms of the preconditioner and of the residual differ by about sqrt(rtol); beside a far
     larger right-hand side a small subsystem is not seen. `solve` is a solver for other right-hand
-    sides, from zero.
+    sides, from a zero guess; `subsystems` are uncoupled ones, None for one alone.
     """
 
     def norms(vector: PETSc.Vec) -> Array:

@@ -149,7 +149,7 @@ def sparse_rows(
     """Return rows of a matrix of which entries are given, summed at each place.
 
     The rows are ascending, shape (n,); entries are rows, columns and values, and those of other
-    rows are left out. The result are the global numbers of the columns, ascending, shape (m,), and
+    rows are left out. The result has the global numbers of the columns, ascending, shape (m,), and
     the matrix, shape (n, m).
     """
     row = np.searchsorted(rows, entries[0])

@@ -124,11 +124,11 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
 def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
     """Read a mesh file of one of several formats, by the ending of its name. Collective.
 
-    The formats are those of `FORMATS`, of Gmsh as `from_msh` reads it. Sets of cells are regions;
-    sets of facets, surfaces, and sets of nodes (the facets of the boundary all of whose nodes they
-    have) are parts. Positive whole numbers of cells or nodes in files of VTK, XDMF and Nastran are
-    sets. Of XDMF that `convert` has written each rank reads its share; other files are read on
-    rank 0.
+    The formats are that of Gmsh, as `from_msh` reads it, and those of the table in docs/how-to.md
+    (`FORMATS`). Sets of cells are regions; sets of facets, surfaces, and sets of nodes (the facets
+    of the boundary all of whose nodes they have) are parts. Positive whole numbers of cells or
+    nodes in files of VTK, XDMF and Nastran are sets. Of XDMF that `convert` has written each rank
+    reads its share; other files are read on rank 0.
 
     Parameters
     ----------

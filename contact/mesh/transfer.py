@@ -36,10 +36,11 @@ def refined(domain: Domain, marked: Indices | None = None) -> Domain:
 def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain, Indices]:
     """Cut every edge, or those of marked cells, in two; names are inherited. Collective.
 
-    The cells of the new mesh lie in the cells of the old one, on the same rank; the cell in which
-    each owned cell lies is the second result. Where all edges are cut a curved boundary keeps its
-    old straight facets; those of marked cells follow the curve, and others are cut as far as that
-    asks for (Plaza and Carey, Appl. Numer. Math. 32, 2000).
+    `marked` are owned cells, all by default; others are cut as far as the cuts of these ask for
+    (Plaza and Carey, Appl. Numer. Math. 32, 2000). The cells of the new mesh lie in the cells of
+    the old one, on the same rank; the second result is the old cell in which each new owned cell
+    lies. Where all edges are cut a curved boundary keeps its old straight facets; those of marked
+    cells follow the curve.
     """
     coarse = domain.mesh
     tdim = coarse.topology.dim

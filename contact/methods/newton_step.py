@@ -99,7 +99,10 @@ class NewtonStep:
         self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
     def rejected(self, residual: float) -> bool:
-        """Tell whether the step is to be taken again without psi', which raised the residual."""
+        """Tell whether the last step raised the residual by a derivative that may be left out.
+
+        It is then to be taken again, without the derivative of psi by the gap.
+        """
         return self._conductivity_derivative.worsened(residual)
 
     def _forcing_term(self, residual: float) -> float:

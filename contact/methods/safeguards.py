@@ -80,7 +80,10 @@ def bound_by_slip(interface: Interface, total: Array, length: Array, limit: floa
 
 
 def regularisation(interface: Interface, residual: float, nodal_stiffness: float) -> Array:
-    """Return the Levenberg-Marquardt term, (n, d, d): it bounds steps, less at small residuals."""
+    """Return the Levenberg-Marquardt term of the nodal blocks, shape (n, d, d).
+
+    It bounds the steps while the active set changes, and decreases with the residual.
+    """
     nodes = interface.nodes
     along = nodes.normal[:, :, None] * nodes.normal[:, None, :]
     return REGULARISATION * min(residual, 1.0) * nodal_stiffness * (along + nodes.tangent)

@@ -140,7 +140,10 @@ class UnconstrainedModes:
         return replace(state, x=state.x - moved.ravel())
 
     def free_motion(self, problem: AnyProblem, state: State) -> RigidMotion | None:
-        """Return unconstrained modes at a whole or condensed solution; None without. Collective."""
+        """Return the unconstrained modes at a solution; None if there are none. Collective.
+
+        The problem is the whole one or a condensed one.
+        """
         interface = problem.interface
         nodes, jump = interface.nodes, interface.nodes.jump(state.x)
         # Pressures that are rounding do not constrain.

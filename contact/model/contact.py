@@ -238,7 +238,7 @@ class Contact(Described):
     ) -> Contact:
         """Return the contact with objects in all places, for a problem. Collective.
 
-        Friction and conductor are those of contacts that have none of their own.
+        The given friction and conductor are taken where the contact has none of its own.
         """
         electric = self.electric or electric
         if isinstance(electric, Electric):

@@ -114,7 +114,7 @@ def values_at(
 ) -> Array:
     """Return a field's values (n,) at points (n, d) and a time. Collective.
 
-    InputError on all ranks, with the name of the field, if they are no finite numbers on one.
+    InputError on all ranks, with the name of the field, if a value on one is no finite number.
     """
     with on_all_ranks(comm), naming(name):
         values = at_time(field, time).numpy(points)
@@ -253,7 +253,10 @@ class Ufl:
         return made
 
     def numpy(self, points: Array) -> Array:
-        """Return values at points (n, d) in local cells, InputError elsewhere. Collective."""
+        """Return the values at points (n, d), by local cells, shape (n,). Collective.
+
+        InputError if a point is in no cell that its rank knows.
+        """
         function = self._function
         mesh = function.function_space.mesh
         x = np.zeros((len(points), 3))

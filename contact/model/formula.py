@@ -120,7 +120,10 @@ class Expression:
         return float(Expression(self.source, time).numpy(np.zeros((1, 3)))[0])
 
     def numpy(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return finite values (n,) at points (n, 2) or (n, 3); InputError also for z in 2-D."""
+        """Return the values, shape (n,), at points, shape (n, 2) or (n, 3).
+
+        InputError if a value is not finite, or z is used in 2-D.
+        """
         points = np.asarray(points, dtype=np.float64)
         # An array: NumPy's numbers divide by 0, Python's do not.
         time = None if self.time is None else np.full(1, self.time, dtype=np.float64)

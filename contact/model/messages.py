@@ -65,7 +65,10 @@ def _message(error: ErrorDetails) -> InputError:
 
 
 def sections_of(annotation: Any) -> dict[str, type]:
-    """Return sections and dataclasses (`section.described`) in an annotation, by their names."""
+    """Return the classes that read tables in an annotation, by their names.
+
+    These are sections, and dataclasses (`section.described`).
+    """
     if isinstance(annotation, type):
         reads = issubclass(annotation, BaseModel) or is_pydantic_dataclass(annotation)
         return {annotation.__name__: annotation} if reads else {}

@@ -132,7 +132,10 @@ def _check_sizes(problem: ContactProblem) -> None:
 
 
 def check_supports(problem: ContactProblem) -> None:
-    """Refuse different values of two supports for one component on a common facet. Collective."""
+    """Refuse different values of two supports for one component on a common facet. Collective.
+
+    InputError if they differ at the time of the problem by more than rounding.
+    """
     space, time = problem.body.space, problem.time
     for i, j in combinations(range(len(problem.description.fixed)), 2):
         first, last = problem.description.fixed[i], problem.description.fixed[j]
@@ -182,7 +185,11 @@ def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterato
 def _differing(
     problem: ContactProblem, pair: tuple[int, int], name: str, nodes: NDArray[np.int32]
 ) -> Array | None:
-    """Return values of two supports where they differ, and the point, (2 + d,). Collective."""
+    """Return the values of two supports where they differ, and the point, (2 + d,). Collective.
+
+    None if they do not differ at the nodes. `pair` has the numbers of both supports, `name` is the
+    component.
+    """
     points = problem.body.space.tabulate_dof_coordinates()[nodes, : problem.dim]
     values = np.zeros((len(points), 2))
     for k, number in enumerate(pair):

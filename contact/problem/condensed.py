@@ -353,7 +353,10 @@ class Condensation:
         return stiffness[own]
 
     def expand(self, condensed_problem: CondensedProblem, x: Array) -> Array:
-        """Return the whole body's owned increment by the last condensed problem's x. Collective."""
+        """Return the increment of the whole body's owned unknowns. Collective.
+
+        `x` is the solution of the condensed problem that `linearise` returned last.
+        """
         self.counters.linear_solves += 1
         self.counters.linear_iterations += 1
         retained = np.concatenate(self.whole_problem.comm.allgather(x - condensed_problem.body.x_0))

@@ -124,8 +124,8 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
 class Linearised:
     """The linearised equations at a solution, factorised once.
 
-    The problem of a step of an evolution is that of the step, the complementarity parameters are
-    for gamma, and `active` is the active set of the solution.
+    In an evolution problem and state are those of one step. The complementarity parameters give
+    gamma; `active` is the active set of the solution.
     """
 
     def __init__(

@@ -343,7 +343,10 @@ class ContactProblem:
 
     @cached_property
     def transformation(self) -> Transformation | None:
-        """X = C y of its linear systems; None where jumps are nodal values. Collective."""
+        """The transformation x = C y of the linear systems. Collective.
+
+        None where jumps are nodal values and there are no global unknowns.
+        """
         body, nodes = self.body, self.nodes
         unknowns, motions = body.global_unknowns, body.global_unknowns.ties
         if nodes.coupling is None and unknowns.size == 0:

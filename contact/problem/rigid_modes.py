@@ -325,7 +325,7 @@ class Release:
     motion: Array  #: the mode, (m,)
     power: float  #: f . m of the loads
     resisted: float  #: largest resistance of layers and friction, less than the power
-    saturated: bool  #: whether they would balance rigid parts in place of the layers
+    saturated: bool  #: whether rigid parts in place of the layers would balance the loads
 
 
 #: The motion of a body by loads beyond the pressure of a layer without a rigid part.
@@ -343,7 +343,7 @@ class UnilateralSupport:
     group: Group  #: the bodies, with their modes
     free: Array  #: modes that the supports do not constrain, (m, k)
     cone: Array  #: rows of all ranks, (rows, n, k)
-    #: Largest forces, (n,) (force); infinite but on saturating layers and for that friction.
+    #: Largest forces, (n,) (force); infinite but on saturating layers and for the friction there.
     bound: Array
     normal: NDArray[np.bool_]  #: which are contact forces, (n,)
 

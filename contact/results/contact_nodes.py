@@ -312,10 +312,10 @@ class ContactShare:
     force: Array  #: of the body on its foundation, or on the other body, see `Resultant`
     moment: Array  #: as the force
     area: float  #: tributary areas of the nodes that touch (length^(d - 1))
-    max_pressure: float  #: (stress)
-    mean_pressure: float  #: over that area (stress)
-    stick: float  #: share of that area
-    slip: float  #: share of that area
+    max_pressure: float  #: largest contact pressure (stress)
+    mean_pressure: float  #: mean contact pressure over `area` (stress)
+    stick: float  #: share of `area` that sticks
+    slip: float  #: share of `area` that slips
     dissipation: float  #: of friction in the step (work)
 
 

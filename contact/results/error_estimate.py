@@ -204,7 +204,10 @@ def _rounding(problem: ContactProblem, state: State, volume: float) -> float:
 
 
 def sampled(fields: DerivedFields) -> tuple[Array, Array]:
-    """Return fluxes, in Mandel's basis, with D if coupled, and |dev eps| in the owned cells."""
+    """Return the fluxes and |dev eps| at the points of the owned cells.
+
+    Fluxes are the stress in the basis of Mandel, and D where there is coupling.
+    """
     body, columns = fields.body, fields.columns
     count = body.domain.mesh.topology.index_map(body.dim).size_local
     flux = np.zeros((count, len(fields.points), 9 if body.piezoelectric else 6))

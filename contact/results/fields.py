@@ -109,7 +109,7 @@ class Extremes(NamedTuple):
     von_mises: float  #: (stress)
     #: Volume with |dev eps| above first yield or plastic strain; None for a law without.
     yielded: float | None
-    volume: float  #: all of it
+    volume: float  #: of all of the material
     plastic: float | None  #: equivalent plastic strain; None for a law without
 
 

@@ -51,7 +51,10 @@ class Differentiable(Functional, Protocol):
     """A functional that knows its derivatives, which the adjoint asks for."""
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
-        """Return them by owned unknowns, and by forces at the nodes, shape (n, d). Collective."""
+        """Return the derivatives by unknowns, and by the forces at the nodes. Collective.
+
+        Unknowns are the owned ones with the global ones behind; the forces have the shape (n, d).
+        """
 
 
 #: Functionals by the names of their columns.
@@ -210,7 +213,7 @@ class MaxDisplacement(Largest):
 class Weighted:
     """A weighted sum of the unknowns: a mean displacement, a rigid motion, a potential."""
 
-    #: On the owned unknowns and the global ones. Collective.
+    #: Returns the weights of a problem, on the owned unknowns and the global ones. Collective.
     weights: Callable[[ContactProblem], Array]
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
@@ -227,8 +230,9 @@ class Weighted:
 class Reaction:
     """A weighted sum of residual forces: of a support, an electrode, or a rigid foundation."""
 
-    weights: Callable[[ContactProblem], Array]  #: on the owned unknowns and the global ones
-    #: A given force that the residual is without; None for none.
+    #: Returns the weights of a problem's residual, on the owned unknowns and the global ones.
+    weights: Callable[[ContactProblem], Array]
+    #: Returns a given force that the residual is without; None for none.
     given: Callable[[ContactProblem, State], float] | None = None
 
     def __call__(self, problem: ContactProblem, state: State) -> float:

@@ -185,7 +185,8 @@ class ChargeBalance:
     """Free charges of a body.
 
     A node of two electrodes with a prescribed potential counts for the one that is fixed first.
-    With an insulator and one electrode all parts are neutral, though not free of charge everywhere.
+    `magnitude` is a scale: with an insulator and one electrode all parts are neutral, though not
+    free of charge everywhere.
     """
 
     electrodes: Mapping[str, float]  #: of parts with a prescribed or one unknown potential

@@ -2,7 +2,8 @@
 
 `fixed_point` over `uzawa`, and `penalty`; both are an `OuterLoop` (`fixed_point`). Newton's method
 does not fall back on them. By default they are accelerated and end by the residuals;
-docs/algorithms.md has the options for the algorithms as printed.
+docs/algorithms.md has the options for the algorithms as printed. Numbers such as (3.45) are those
+of equations of the thesis.
 
 References
 ----------

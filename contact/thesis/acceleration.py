@@ -49,7 +49,10 @@ class ResidualMinimiser:
         self._best: Array | None = None
 
     def next(self, force: Array, z: Array, image: Array) -> Array:
-        """Return the next z, (m,), by lambda, lambda + r u, and z of the relaxation. Collective."""
+        """Return the next z, (m,). Collective.
+
+        `force` and `z` are lambda and lambda + r u, `image` is the z of the plain relaxation.
+        """
         new, old = np.stack([force, z]), self._best
         if old is None:
             self._best = new

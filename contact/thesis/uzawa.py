@@ -95,13 +95,16 @@ class RelaxationResult:
     increment: Array  #: dx on the owned unknowns
     #: Contact stress lambda + r (u - phi) of the last Step 1, in equilibrium with its u.
     forces: Multipliers
-    z: Array  #: of the next relaxation, about the new iterate, (n, 1 + d)
+    z: Array  #: variable of the next relaxation, about the new iterate, (n, 1 + d)
     iterations: int  #: number of linear solves
     stalled: bool = False  #: whether the stagnation limit has ended it
 
 
 def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
-    """Return derivatives of `project_disc` at z (n, d) along (n, d, k); on the rim the inside's."""
+    """Return derivatives of `project_disc` at z, (n, d), along directions, (n, d, k).
+
+    On the rim they are those of the inside.
+    """
     length = np.linalg.norm(z, axis=1)
     beyond = length > radius
     unit, scale = np.zeros_like(z), np.ones_like(length)

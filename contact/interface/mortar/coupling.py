@@ -320,8 +320,8 @@ def couple(
 
     Facets face each other up to the distance `reach` (length). `no_multiplier` has the global
     numbers of slave nodes without multiplier, at least those of this rank and of its facets
-    (`ModifiedDualBasis`); `nodes` those of the nodes of this rank with one, whether they face the
-    master or not, by default those that do.
+    (`ModifiedDualBasis`). `nodes` has those of this rank's nodes with a multiplier, whether they
+    face the master or not; by default they are those that do.
     """
     opposite = Opposite.of(slave, master, reach)
     parts = integrate(slave, opposite, ModifiedDualBasis.of(slave, no_multiplier))

@@ -75,7 +75,7 @@ class JumpRows:
         return JumpRows(nodes, slaves, matrix, np.zeros(0, dtype=np.int64), none)
 
     def apply(self, owners: Owners, values: Array) -> Array:
-        """Return D times the values at `nodes`, all of their side, shape (n, m). Collective.
+        """Return D v, shape (n, m), of values v at `nodes`, which include all `slaves`. Collective.
 
         Jumps made of infinite values are NaN.
         """

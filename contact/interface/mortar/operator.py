@@ -31,11 +31,11 @@ class CouplingOperator:
     halo: Halo  #: the nodes of this rank and the ghosts in its rows
     jumps: sparse.csr_array  #: rows of this rank, shape (r, nodes)
     change: BasisChange  #: change of basis from nodal values to jumps
-    numbers: NDArray[np.int64]  #: global numbers of their nodes, shape (r,)
+    numbers: NDArray[np.int64]  #: global numbers of the nodes of these rows, shape (r,)
     between: bool  #: whether there are masters
     local: NDArray[np.intp]  #: local numbers of the nodes in jumps of any rank, shape (h,)
-    places: NDArray[np.intp]  #: positions of nodes of jumps among given nodes, shape (k,)
-    own: NDArray[np.intp]  #: and the rows of these, shape (k,)
+    places: NDArray[np.intp]  #: positions of nodes of `jumps` among given nodes, (k,)
+    own: NDArray[np.intp]  #: rows of `jumps` at `places`, shape (k,)
 
     def at(self, numbers: NDArray[np.int64]) -> CouplingOperator:
         """Return the operator at other nodes of this rank, given their global numbers."""

@@ -88,9 +88,9 @@ class Points:
     on_master: Array  #: points of the reference master facets, shape (p, dim)
     weight: Array  #: quadrature weights, lengths or areas on the slave facet, or its rings, (p,)
     gap: Array  #: distance from slave to master facet along the slave's direction, shape (p,)
-    #: That of the curved surfaces also where displacements do not follow these, shape (p,).
+    #: Gap of the curved surfaces, also where displacements do not follow these, shape (p,).
     curved_gap: Array
-    #: Of the deepest overlap on each slave facet, of facets and of the surfaces that they
+    #: Depth of the deepest overlap on each slave facet, of facets and of the surfaces that they
     #: approximate; below 0 the least distance, shape (f,) (length).
     depth: Array
 
@@ -103,7 +103,8 @@ def common_points(
 ) -> Points:
     """Return quadrature points on the intersections of pairs of facets.
 
-    A slave facet looks along its `direction`, a unit vector, shape (f, d).
+    `pairs` has the slave and the master facet of each pair, shapes (n,). A slave facet looks along
+    its `direction`, a unit vector, shape (f, d).
     """
     i, j = pairs
     own, other = _on_planes(slave, i, direction[i], (slave.points[i], master.points[j]))

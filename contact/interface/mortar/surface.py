@@ -266,10 +266,10 @@ class Surface:
     def reconstructed(self, values: Array) -> tuple[NDArray[np.int64], Array]:
         """Return the third-order reconstruction of a function from its corner values. Collective.
 
-        These have the shape (f, c), infinite for none. The smoother of both, function and surface,
-        has the larger weight (Jiang and Shu, as in `deviations`). The result are the nodes of this
-        rank, ascending, and at each the value, its weight against that on the surface, from 0 to 1,
-        and the unknown part; shape (n, 3).
+        The values have the shape (f, c), infinite where the function has none. The smoother of
+        both, function and surface, has the larger weight (Jiang and Shu, as in `deviations`). The
+        result has the nodes of this rank, ascending, and at each the value, its weight against that
+        on the surface, from 0 to 1, and the unknown part; shape (n, 3).
         """
         corners, places = self.nodes[:, : self.shape.corners], self.shape.nodes(self.degree)
         rise, other, _ = deviations(corners, self.points, self.normal, self.owners, values=values)

@@ -282,7 +282,10 @@ class Triangles(Shape):
 
 
 def read_stl(path: str | Path) -> Any:
-    """Return the triangles of an STL file as pyvista.PolyData in double precision."""
+    """Return the triangles of an STL file as pyvista.PolyData in double precision.
+
+    InputError if the file cannot be read, has no triangles, or coordinates that are no numbers.
+    """
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
