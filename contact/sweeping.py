@@ -155,11 +155,11 @@ def sweep(
 ) -> list[dict[str, Any]]:
     """Solve a case for all combinations of values; write a row of ``sweep.csv`` after each.
 
-    The `overrides` replace values of the case file, the last one of the `axes` varies fastest,
-    `warm` solves have the solution before as warm start, and `columns` are further ones, as in
-    `summary_columns`. Returns the rows; after a signal, which raises `Interrupted`, those before
-    it are in the table. A folder with a sweep of other input, or files that no sweep has left, is
-    refused. Collective.
+    The `overrides` replace values of the case file, and the last one of the `axes` varies fastest.
+    If `warm`, each solve has the solution before as warm start; `columns` are further ones, as in
+    `summary_columns`. Returns the rows; after a signal, which raises `Interrupted`, those before it
+    are in the table. InputError if a value is not accepted, or the folder has a sweep of other
+    input, or files that no sweep has left. Collective.
     """
     _check_columns(columns)
     names = [axis.key for axis in axes]

@@ -176,7 +176,8 @@ def _check_overlap(
 ) -> None:
     """Refuse an overlap that is not to be pressed apart, or that nodes do not resolve. Collective.
 
-    `resolves`: whether no facet without neighbours on the master overlaps it.
+    `resolves` tells that no partly covered facet overlaps the master without a neighbour that faces
+    it.
     """
     rounding = TOUCHING * body.domain.size
     least = max(body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN), 0.0)
@@ -227,7 +228,9 @@ def _without_multiplier(
 def _beyond_rim(slave: Surface, coupling: Coupling) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Return nodes of this rank and its facets beyond the rim of the master. Collective.
 
-    They have neighbours that are not; also which facets have none of these, shape (f,).
+    They belong to partly covered facets beside facets that face the master, but to none of the
+    latter. The second result tells which partly covered facets are beside none that faces it, shape
+    (f,).
     """
     # Their jump is extrapolated, and closing it would press on the master beyond its rim.
     owners, faces = slave.owners, coupling.faces > FACES
@@ -251,7 +254,7 @@ def _check_apart(body: BodyEquilibrium, coupling: Coupling, owners: Owners, labe
 
 
 def _with_prescribed_normal(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
-    """Return the slave nodes of this rank whose normal is fixed."""
+    """Return the slave nodes of this rank whose displacement along the normal is prescribed."""
     _, local = owned_among(body.layout.index_map, coupling.nodes)
     moves = body.free[local, : body.dim]
     constrained = np.linalg.norm(coupling.normal * moves, axis=1) <= APART

@@ -90,7 +90,7 @@ def _frames(solution: Solution) -> list[Frame]:
 
 
 def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> None:
-    """Write main fields and contact part of each step, and the lists of these files.
+    """Write main fields and contact part of each step, a file each, and the lists of these files.
 
     The lists are ``fields.pvd`` and ``contact.pvd``.
     """

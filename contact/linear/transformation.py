@@ -148,7 +148,7 @@ class Transformation:
         return summed(self.layout.comm, self.motions.T @ forces)
 
     def expand(self, y: Array) -> Array:
-        """Return x = C y, q behind. Collective."""
+        """Return x = C y, with q behind the nodal unknowns. Collective."""
         q = y[self.owned :]
         return np.concatenate([times(self.matrix, y[: self.owned] + self.motions @ q), q])
 

@@ -182,8 +182,9 @@ def profiles(run: Run, scale: float, places: Array, box: Array | None) -> list[P
 def foundation(run: Run, scale: float) -> Any:
     """Return rigid shapes in 3-D beside displacements times a scale.
 
-    Those that are known are whole in a box around the contact parts; of others the parts that face
-    the body: the contact facets moved by their gaps, as far as these are not large.
+    Shapes that are known (`Run.shapes`) are whole in a box around the contact parts. Of others it
+    has the parts that face the body: the contact facets moved by their gaps, as far as these are
+    not large.
     """
     skin = linear(run.surface)
     row, faces = np.asarray(skin["row"]), skin.regular_faces
@@ -226,8 +227,9 @@ def _placed(
 ) -> Callable[[Array], Array]:
     """Return the distances from a shape as it is drawn.
 
-    It has moved, and is farther away by `more`: translated, as far as the contact directions let
-    it. It is drawn a little behind the facets of the body, which are chords where that is round.
+    It has the motion of its foundation, and is farther away by `more`, by a translation as far as
+    the contact directions determine one. It is drawn a little behind the facets of the body, which
+    are chords of a curved surface.
     """
     points = np.column_stack([table[axis] for axis in "xyz"])
     normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"])
@@ -247,7 +249,10 @@ def _placed(
 
 
 def _surface(distance: Callable[[Array], Array], box: Array) -> Any:
-    """Return the surface where a distance is 0 in a box: at first roughly, then where it is."""
+    """Return the surface in a box where a distance is 0.
+
+    The distance is sampled on a grid of the box, then on a finer one of the surface found there.
+    """
     for _ in range(2):
         step = np.ptp(box, axis=0) / (FINE - 1)
         # Beside the round numbers: centres and axes of shapes have no distance.

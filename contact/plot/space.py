@@ -111,7 +111,10 @@ def render(ax: Axes, camera: Camera, add: Callable[[Any], None], pixels: int = 1
 
 
 def triad(ax: Axes, camera: Camera, corner: tuple[float, float], share: float) -> None:
-    """Draw the directions of the coordinates at a corner, of a share of the longer side."""
+    """Draw the directions of the coordinates in a square at a corner.
+
+    Its side is a share of the longer side of the picture.
+    """
     size = camera.high - camera.low
     inset = ax.inset_axes((*corner, *(share * size.max() / size)))
     inset.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
@@ -212,7 +215,7 @@ class Zone:
         return Zone(corners, area, moved, pressure, normal)
 
     def lifted(self, size: float) -> Any:
-        """Return the deformed triangles, a little in front of a body of that size."""
+        """Return the deformed triangles, a little in front of a body of a size (length)."""
         out = self.area / np.linalg.norm(self.area, axis=1)[:, None]
         mesh = polygons(self.corners + self.displacement + LIFTED * size * out[:, None])
         mesh["pressure"] = self.pressure.ravel()
@@ -235,8 +238,9 @@ class Sight(NamedTuple):
 def chosen_sight(run: Run, zone: Zone, cut: bool = False) -> Sight:
     """Return how the contact zone of a run is seen.
 
-    From where most of it is seen, tilted from its mean normal. Bodies beside its own are
-    translucent, and so is that if it hides it from all sides; or they are cut open instead.
+    The eye is where most of the zone is seen, aslant to its mean normal. Bodies without a part of
+    the zone are translucent, and so is the body with it if it hides the zone from all sides. With
+    `cut` all are cut open instead.
     """
     size = np.linalg.norm(zone.area, axis=1)[:, None]
     places, out = zone.corners.mean(axis=1), zone.area / size
@@ -270,8 +274,9 @@ def chosen_sight(run: Run, zone: Zone, cut: bool = False) -> Sight:
 def section(run: Run, zone: Zone) -> Sight:
     """Return the sight of a body that is cut open, through the middle of its contact zone.
 
-    Along its normal, across an axis. Where the zone ends at a face of the body, as at a plane of
-    symmetry, nothing is cut away.
+    The plane of the cut contains the normal of the zone, and stands across an axis as far as that
+    allows. Where the zone ends at a face of the body, as at a plane of symmetry, nothing is cut
+    away.
     """
     axes = np.eye(3) - np.outer(zone.normal, zone.normal)
     size = np.linalg.norm(axes, axis=1)
@@ -303,7 +308,7 @@ class Scene:
     colours
         Arguments of ``add_mesh`` for the colours of a field.
     painted
-        Whether that is the pressure, on the contact zone of a plain body.
+        Whether the field is the pressure, on the contact zone of a plain body.
     """
 
     body: Any
@@ -440,7 +445,8 @@ def _legend(run: Run, frictional: bool) -> list[Patch]:
 def close_ups(run: Run, zone: Zone) -> list[tuple[Zone, int, str]]:
     """Return the zones of close-ups, the sides from which they are seen, and their names.
 
-    Of few contacts each, else all as one.
+    A few contacts have a close-up each; more have one together, or two if much of the zone is seen
+    from behind its normal alone. The side is 1, or -1 from behind.
     """
     touching = np.unique(run.table["entry"][run.table["status"] != "open"])
     if 1 < len(touching) <= CLOSE:
@@ -456,7 +462,7 @@ def close_ups(run: Run, zone: Zone) -> list[tuple[Zone, int, str]]:
 def close_camera(zone: Zone, side: int, whole: Camera) -> Camera:
     """Return the camera of a close-up: along the normal, from outside, upwards as the whole is.
 
-    In coordinate planes upwards along the axis that is nearest to it.
+    In coordinate planes the axis that is nearest to that direction points upwards.
     """
     along = side * float(whole.up @ zone.normal)
     above = whole.up - side * along * zone.normal
@@ -470,7 +476,7 @@ def close_camera(zone: Zone, side: int, whole: Camera) -> Camera:
 
 
 def seen(run: Run, grid: Any, zone: Zone, towards: Array | None = None) -> Any:
-    """Return the triangles of a contact part around a zone; those that face a direction, if any."""
+    """Return the triangles of a contact part around a zone, or those that face a direction."""
     skin = linear(grid)
     faces, low, high = skin.regular_faces, zone.points.min(axis=0), zone.points.max(axis=0)
     away = abs(skin.points[faces].mean(axis=1) - (low + high) / 2) - (high - low) / 2

@@ -169,7 +169,7 @@ def _least_distance(clear: Array, gap: Array, sides: Sequence[_SidePoints]) -> A
 
 
 def _measure(slave: Surface, facets: NDArray[np.intp], at: Array, nodes: Array) -> Array:
-    """Return lengths or areas on slave facets, or their rings, by those on the planes, (p,)."""
+    """Return lengths or areas on slave facets, or of their rings, per those on the planes, (p,)."""
     gradients, d = slave.shape.gradients(slave.order, at), slave.shape.dim
     turned = np.einsum("pkr,pkd->pdr", gradients, nodes[..., :d])
     size = np.linalg.norm(area_vectors(slave.slopes(facets, at)), axis=1)
