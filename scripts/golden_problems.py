@@ -381,9 +381,10 @@ def derivatives_of_charge() -> dict[str, Value]:
     quantities = ["charge_electrode", "charge_foundation", "contact_force_y"]
     parameters = ["material.piezo.e33", "load.0.traction.0", "friction.mu"]
     found = _of_sensitivities(sensitivity(solution, quantities, parameters))
-    # The charge is 1/63 of the sum of its magnitudes, whose rounding a difference by e33 has.
-    name = "d charge_electrode/d material.piezo.e33"
-    return found | {name: Value(found[name].value, 64.43 / 15.8)}
+    # A difference by e33 has the rounding of the force, and of the sum of the charge's magnitudes.
+    scales = {"charge_electrode": 64.43 / 15.8, "contact_force_y": 314.6 / 15.8}
+    names = {f"d {quantity}/d material.piezo.e33": scale for quantity, scale in scales.items()}
+    return found | {name: Value(found[name].value, scale) for name, scale in names.items()}
 
 
 def _of_sensitivities(found: Mapping[str, Mapping[str, float]]) -> dict[str, Value]:
