@@ -232,18 +232,16 @@ class Interface:
         lambda is the contact stress of the multipliers, p_l the pressure of the layer, and D.nu the
         charge, 0 of an insulator.
         """
-        nodes, jump = self.nodes, self.nodes.jump(x)
-        density = self.foundation.force(jump, self.pressure(jump, multipliers))
-        density[:, : self.dim] += multipliers.vectors(nodes)
+        nodes = self.nodes
+        nodes.add_jump_transposed(nodes.weight[:, None] * multipliers.vectors(nodes), residual)
+        for law, jump, pressure in self.acting(x, multipliers):
+            density = law.force(jump, pressure)
+            law.nodes.add_jump_transposed(law.nodes.weight[:, None] * density, residual)
         if self.proximal is not None:
-            away = nodes.tangential_component(jump) - self.proximal.about
-            density[:, : self.dim] += self.proximal.stiffness * away
-        nodes.add_jump_transposed(nodes.weight[:, None] * density, residual)
-        if self.fixed_conducting is not None:
-            law, there = self.fixed_conducting, self.fixed_conducting.nodes
-            jump = there.jump(x)
-            charge = law.force(jump, law.resting(jump))
-            there.add_jump_transposed(there.weight[:, None] * charge, residual)
+            away = nodes.tangential_component(nodes.jump(x)) - self.proximal.about
+            nodes.add_jump_transposed(
+                self.proximal.stiffness * nodes.weight[:, None] * away, residual
+            )
 
     def add_charge(
         self, residual: Array, x: Array, change: Array, multipliers: Multipliers

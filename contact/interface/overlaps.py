@@ -256,14 +256,14 @@ class _Boundaries:
         surface = self._curved(np.union1d(near, facet))
         opposite = surface.sent(near, ranks)
         # A foot aside, where facets turn, has a height in another direction: none adds to depths.
-        own = np.minimum(surface.height_bounds(facet, at)[0], 0.0)
+        own = np.minimum(surface.distance_bounds(facet, at, surface.normal[facet])[0], 0.0)
         sides = np.asarray(self.sides.any(axis=2))
         _, theirs, centres = exchanged(comm, ranks, sides[near], centres[near])
         depth = np.full(len(x), np.inf)
         rounding = NEGLIGIBLE * self.body.domain.size
         for i, j in in_balls(centres, points, radius, CHUNK):
             distance, there = _from_facets(opposite, j, x[i])
-            behind = np.minimum(opposite.height_bounds(j, there)[0], 0.0)
+            behind = np.minimum(opposite.distance_bounds(j, there, opposite.normal[j])[0], 0.0)
             np.minimum.at(depth, i, distance + own[i] + behind - _bow(opposite)[j])
             np.minimum.at(least, i, distance)
             nearest_ones = distance <= least[i] + rounding

@@ -498,7 +498,9 @@ def missing_pressure(group: Group, time: float, pressing: Array) -> float:
         np.stack([pressing @ normal, pressing @ np.abs(normal)]), op=MPI.SUM
     )
     missing = np.abs(slipless.T @ free @ work - resisted)
-    return float(np.max(missing / np.maximum(most, BALANCED * scale), initial=0.0))
+    reference = np.maximum(most, BALANCED * scale)
+    acts = reference > 0
+    return float(np.max(missing[acts] / reference[acts], initial=0.0))
 
 
 def _most_power(
