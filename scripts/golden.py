@@ -442,11 +442,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"{len(differences)} values differ by more than {TOLERANCE:g}")
             status = 1
         if given.renew:
-            failed = [name for name, values in found.items() if "failed" in values]
-            if failed:
-                print(f"not stored, for they failed: {', '.join(failed)}")
-            kept = renewed(stored_here, {k: v for k, v in found.items() if k not in failed})
-            write({**others, **kept}, TABLE)
+            failed = {name for name, values in found.items() if "failed" in values}
+            if failed or remeshed:
+                names = ", ".join(sorted(failed | remeshed))
+                print(f"stored values stay, for these failed or are on other meshes: {names}")
+            stay = {k: v for k, v in stored_here.items() if k in failed | remeshed}
+            new = {k: v for k, v in found.items() if k not in failed | remeshed}
+            write({**others, **renewed(stored_here, new), **stay}, TABLE)
             status = bool(failed)
     return MPI.COMM_WORLD.bcast(int(status))
 

@@ -95,9 +95,10 @@ def direction(text: str) -> tuple[float, float, float]:
         x, y, z = map(float, text.split(","))
     except ValueError:
         x = y = z = 0.0
-    if not 0 < math.hypot(x, y, z) < math.inf:
+    largest = max(abs(x), abs(y), abs(z))
+    if not largest > 0 or not all(map(math.isfinite, (x, y, z))):
         raise InputError(
             f"--view {text}; accepted: three numbers that are not all 0, such as 1,-1,0.5",
             "figure-option",
         )
-    return x, y, z
+    return x / largest, y / largest, z / largest

@@ -125,10 +125,7 @@ class Expression:
         InputError if a value is not finite, or z is used in 2-D.
         """
         points = np.asarray(points, dtype=np.float64)
-        # An array: NumPy's numbers divide by 0, Python's do not.
-        time = None if self.time is None else np.full(1, self.time, dtype=np.float64)
-        result = self._evaluate(points.T, points.shape[1], time)
-        values = np.array(np.broadcast_to(result, points.shape[:1]), dtype=np.float64)
+        values = self.values(points)
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             place = ", ".join(f"{c:g}" for c in points[bad[0]])
@@ -136,6 +133,13 @@ class Expression:
                 f"{self} is not finite at ({place}); accepted: a formula that is", "not-finite"
             )
         return values
+
+    def values(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values at points, as `numpy`, not finite where there are none."""
+        # An array: NumPy's numbers divide by 0, Python's do not.
+        time = None if self.time is None else np.full(1, self.time, dtype=np.float64)
+        result = self._evaluate(points.T, points.shape[1], time)
+        return np.array(np.broadcast_to(result, points.shape[:1]), dtype=np.float64)
 
     def ufl(self, x: Expr) -> Expr:
         """Return the scalar UFL expression at ``x``, a vector of length 2 or 3."""

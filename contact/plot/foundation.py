@@ -199,7 +199,8 @@ def foundation(run: Run, scale: float) -> Any:
         more = (scale - 1) * way.more
         if entry in run.shapes:
             facets = body[faces[(skin["entry"] == entry)[faces].all(axis=1)]].mean(axis=1)
-            known.append(_placed(run.shapes[entry], table, more, facets, run.diameter))
+            motion = run.motions.get(entry, np.zeros(6))
+            known.append(_placed(run.shapes[entry], motion, table, more, facets, run.diameter))
         else:
             own = run.table["entry"] == entry
             distance[own], gap[own] = (
@@ -223,25 +224,26 @@ def foundation(run: Run, scale: float) -> Any:
 
 
 def _placed(
-    shape: Shape, table: Table, more: Array, facets: Array, diameter: float
+    shape: Shape, motion: Array, table: Table, more: Array, facets: Array, diameter: float
 ) -> Callable[[Array], Array]:
     """Return the distances from a shape as it is drawn.
 
-    It has the motion of its foundation, and is farther away by `more`, by a translation as far as
-    the contact directions determine one. It is drawn a little behind the facets of the body, which
+    It has a motion (`Run.motions`), and is farther away by `more`, by a translation as far as the
+    contact directions determine one. It is drawn a little behind the facets of the body, which
     are chords of a curved surface.
     """
     points = np.column_stack([table[axis] for axis in "xyz"])
     normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"])
     lever = np.hstack([normal, np.cross(points, normal)])
-    motion = np.linalg.lstsq(lever, table["moved"], rcond=1e-9)[0]
     touching = table["status"] != "open"
     near = touching if touching.any() else slice(None)
-    motion[:3] += np.linalg.lstsq(normal[near], more[near], rcond=1e-3)[0]
+    farther = np.linalg.lstsq(normal[near], more[near], rcond=1e-3)[0]
+    motion = motion + np.concatenate([farther, np.zeros(3)])
     level = float(np.mean(table["moved"][near] + more[near] - lever[near] @ motion))
 
     def distance(places: Array) -> Array:
-        return shape.distance(places - motion[:3] - np.cross(motion[3:], places))[0] + level
+        back = places - motion[:3]
+        return shape.distance(back - np.cross(motion[3:], back))[0] + level
 
     level += float(np.clip(-np.nanmin(distance(facets)), 0.0, 0.01 * diameter))
     level += UNSEEN * diameter

@@ -26,6 +26,7 @@ from contact.ranks import refused
 from contact.results.contact_nodes import Table
 from contact.results.options import Units
 from contact.results.quantity import OPPOSITE
+from contact.results.resultants import rigid_columns
 from contact.typing import Array
 
 
@@ -49,8 +50,11 @@ class Run:
         Grids of pyvista: body, contact part, and the other sides of contacts between bodies.
     regions
         Names of the regions, in the order of the numbers in the field ``region``.
-    shapes
-        The rigid shapes by the numbers of their contacts, as far as the case has them.
+    shapes, moving
+        The rigid shapes by the numbers of their contacts, as far as the case has them; of those
+        that move in 3-D, the end of the names of their columns, and the centre of rotation.
+    motions
+        Displacement, and rotation in radians about the origin, of these, shape (6,).
     step
         Number of the step that these are the results of, from 1; None for the last results.
     steps, tables
@@ -66,6 +70,8 @@ class Run:
     opposite: Any = None
     regions: Sequence[str] = ()
     shapes: Mapping[int, Shape] = field(default_factory=dict)
+    moving: Mapping[int, tuple[str, Array]] = field(default_factory=dict)
+    motions: Mapping[int, Array] = field(default_factory=dict)
     step: int | None = None
     steps: Table | None = None
     tables: Sequence[Table] = ()
@@ -141,6 +147,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
         nodes = np.argsort(row)[np.count_nonzero(row < 0) :]
         along = {f"nu_{axis}": surface["normal"][nodes, i] for i, axis in enumerate("xyz")}
         rigid = surface["rigid"][nodes] > 0
+        shapes, moving = _foundations(about.get("case") or "") if "z" in columns else ({}, {})
         return Run(
             heading(str(about["title"])),
             Units(**about.get("units", {})),
@@ -150,22 +157,49 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             surface,
             opposite=read_grid(folder / OPPOSITE) if OPPOSITE in files else None,
             regions=about.get("regions", ()),
-            shapes=_shapes(about.get("case", "")),
+            shapes=shapes,
+            moving=moving,
+            motions=_motions(moving, rigid_columns(dict(about), "displacement", "rotation")),
             steps=_columns(folder / "steps.csv") if "steps.csv" in files else None,
             tables=_tables(folder / "contact-steps.csv") if "steps.csv" in files else (),
         )
 
 
-def _shapes(case: str) -> dict[int, Shape]:
-    """Return the rigid shapes of a case by the numbers of their contacts.
+def _foundations(case: str) -> tuple[dict[int, Shape], dict[int, tuple[str, Array]]]:
+    """Return `Run.shapes` and `Run.moving` of a case; none of one that this version refuses.
 
-    Not those that files describe, which may be elsewhere by now.
+    Not the shapes that files describe, which may be elsewhere by now.
     """
-    tables = tomllib.loads(case).get("contact", [])
-    contacts = map(Contact.model_validate, tables if isinstance(tables, list) else [tables])
-    found = {k: contact.foundation for k, contact in enumerate(contacts)}
+    try:
+        tables = tomllib.loads(case).get("contact", [])
+        given = tables if isinstance(tables, list) else [tables]
+        contacts = dict(enumerate(map(Contact.model_validate, given)))
+    except (InputError, ValueError):
+        return {}, {}
+    found = {k: each.foundation for k, each in contacts.items()}
     known = {k: shape for k, shape in found.items() if isinstance(shape, Shape)}
-    return {k: shape for k, shape in known.items() if getattr(shape, "file", None) is None}
+    shapes = {k: shape for k, shape in known.items() if getattr(shape, "file", None) is None}
+    movers = {k: each.rigid for k, each in contacts.items() if each.rigid is not None}
+    moving = {
+        k: (f"_{contacts[k].on}" if len(movers) > 1 else "", np.array(rigid.centre or (0, 0, 0)))
+        for k, rigid in movers.items()
+    }
+    return shapes, moving
+
+
+def _motions(
+    moving: Mapping[int, tuple[str, Array]], columns: Mapping[str, float]
+) -> dict[int, Array]:
+    """Return `Run.motions` from the columns of motions."""
+    found = {}
+    for contact, (end, centre) in moving.items():
+        shift, turn = (
+            np.array([columns[f"{name}_{axis}{end}"] for axis in "xyz"], dtype=float)
+            for name in ("rigid", "rigid_rotation")
+        )
+        turn = np.radians(turn)
+        found[contact] = np.concatenate([shift - np.cross(turn, centre), turn])
+    return found
 
 
 def read_step(folder: Path, number: int) -> Run:
@@ -207,6 +241,9 @@ def _at(run: Run, folder: Path, time: float, row: int, fields: str, contact: str
     title = f"{run.title}, t = {time:.3g}".lstrip(", ")
     table = _moved({**run.table, **run.tables[row]}, body)
     own = {"table": table, "body": body, "surface": surface, "opposite": None}
+    assert run.steps is not None
+    columns = {name: column[row] for name, column in run.steps.items()}
+    own["motions"] = _motions(run.moving, columns)
     return replace(run, title=title, step=row + 1, steps=None, tables=(), **own)
 
 

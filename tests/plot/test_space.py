@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from contact.cli.main import main
+from contact.cli.plot import direction
 from contact.plot import figures
 from contact.plot.body import picture
 from contact.plot.foundation import foundation
-from contact.plot.run import Run
+from contact.plot.run import Run, _foundations
 from contact.plot.space import Camera, Zone, chosen_sight, close_camera, contact_figure
 from contact.plot.style import Look
 from contact.solving import solve
@@ -123,6 +124,37 @@ def test_rigid_shapes_are_drawn_whole(name: str, scale: float) -> None:
         np.testing.assert_allclose((high - low)[:2], [3.2, 2.2], rtol=0.02)
 
 
+@pytest.mark.parametrize("kind", ["ball", "punch"])
+def test_shapes_are_drawn_where_they_have_moved(kind: str) -> None:
+    """Along the surface too, and by a given rotation, which contact directions do not tell."""
+    shapes = SHAPES | {
+        "punch": {"shape": "punch", "centre": [1, 0.5, 0], "axis": [0, 0, -1], "radius": 0.25}
+    }
+    rigid = {
+        "displacement": [0.3, 0.0, 0.01],
+        "rotation": [0.0, 0.0, 2.0],
+        "centre": [1.0, -0.5, 0.0],
+    }
+    run = pressed(contact={"on": "bottom", "foundation": shapes[kind], "rigid": rigid}, by=0.0)
+    low, high = np.reshape(foundation(run, 1.0).bounds, (3, 2)).T
+    middle = [1.3 - np.radians(2.0), 0.5]
+    np.testing.assert_allclose((low + high)[:2] / 2, middle, atol=0.005)
+
+
+def test_a_formula_is_drawn_where_it_has_values() -> None:
+    """The box of the picture is larger than the arch."""
+    arch = {"shape": "distance", "distance": "z - 0.5*(sqrt(1.45**2 - (x-1)**2) - 1.45)"}
+    drawn = foundation(pressed(contact={"on": "bottom", "foundation": arch}), 1.0)
+    low, high = np.reshape(drawn.bounds, (3, 2)).T
+    assert -0.46 < low[0] < -0.3 and 2.3 < high[0] < 2.46
+
+
+def test_a_case_of_another_version_has_no_shapes() -> None:
+    """Pictures are those of the facets then."""
+    for case in ("[[contact]]\non = 'bottom'\nlater = 1\n", "contact = 3", "[", ""):
+        assert _foundations(case) == ({}, {})
+
+
 def test_shapes_of_files_are_drawn_by_the_facets(tmp_path: Path) -> None:
     """Where they face the body: pictures need the files of the run alone."""
     np.save(tmp_path / "flat.npy", np.zeros((3, 3)))
@@ -191,3 +223,9 @@ def test_a_page_to_turn_a_body_in(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(figures, "export_page", lambda _, path: path.write_text("page"))
     assert main(["plot", str(out), "--html"]) == 0
     assert (out / "figure-view.html").exists()
+
+
+def test_directions_are_of_the_size_one() -> None:
+    """At least nearly: the largest component is 1."""
+    assert direction("0,0,1e-300") == (0.0, 0.0, 1.0)
+    assert direction("1e300,-1e300,0") == (1.0, -1.0, 0.0)

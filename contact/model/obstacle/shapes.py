@@ -499,9 +499,10 @@ class Level(Shape):
         asked = points if count > 0 else np.zeros((d + 1, d))
         if isinstance(self.function, Expression):
             try:
-                return self.function.numpy(asked)[:count]
-            except InputError:  # no value at one of them: ranks ask at points of their own
+                found = self.function.values(asked)[:count]
+            except InputError:  # ranks ask at points of their own
                 return np.full(count, np.nan)
+            return np.where(np.isfinite(found), found, np.nan)
         words = f"one number for each of the points, an array of shape {asked.shape}"
         assert callable(self.function)
         return real(self.function(asked), asked.shape[:1], words)[:count]
