@@ -322,13 +322,15 @@ def test_a_constant_pressure_is_constant_on_both_sides(dim: int, degree: int) ->
     surface = opposite_surface(found)
     assert surface is not None
     fields = surface.at_points
-    np.testing.assert_allclose(fields["pressure"], 0.01, rtol=1e-11)
-    np.testing.assert_allclose(
-        fields["traction"], np.tile(-0.01 * up, (len(fields["weight"]), 1)), atol=1e-13
-    )
-    np.testing.assert_allclose(
-        fields["normal"], np.tile(up, (len(fields["weight"]), 1)), atol=1e-12
-    )
+    away = [
+        fields["pressure"] / 0.01 - 1,
+        fields["traction"] / 0.01 + up,
+        fields["normal"] - up,
+    ]
+    # On all ranks together, for the next line is collective. Contact alone holds the upper block:
+    # on three ranks its solution has 2e-10 of rounding, on one 1e-13.
+    most = [COMM.allreduce(np.abs(each).max(initial=0.0), op=MPI.MAX) for each in away]
+    np.testing.assert_array_less(most, [1e-9, 1e-9, 1e-12])
     assert COMM.allreduce(fields["weight"].sum()) == pytest.approx(1.0)
 
 
