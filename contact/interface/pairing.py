@@ -157,9 +157,7 @@ def find_pair(
             "pair",
         )
     _check_apart(body, found, slave.owners, label)
-    coarse = bool((alone & (found.depths > least + TOUCHING * body.domain.size)).any())
-    resolves = not body.comm.allreduce(coarse, op=MPI.LOR)
-    _check_overlap(body, found, slave.owners, added, overlap, press, resolves, label)
+    _check_overlap(body, found, slave.owners, added, overlap, press, alone, label)
     placement = PairPlacement(body, slave, master, reach, no_multiplier, found.nodes, added, press)
     return placement, placement.geometry(slave, master, found)
 
@@ -171,21 +169,22 @@ def _check_overlap(
     added: Array,
     overlap: Depths,
     press: bool,
-    resolves: bool,
+    alone: NDArray[np.bool_],
     label: str,
 ) -> None:
     """Refuse an overlap that is not to be pressed apart, or that nodes do not resolve. Collective.
 
-    `resolves` tells that no partly covered facet overlaps the master without a neighbour that faces
-    it.
+    `alone`: partly covered facets without a neighbour that faces the master, shape (f,).
     """
     rounding = TOUCHING * body.domain.size
-    least = max(body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN), 0.0)
+    least = body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
     depth, resolved = found.interference(owners, added)
     inside, beside = overlap
-    depth = max(depth, max(overlap) - least)
+    depth = max(depth, max(overlap) - max(least, 0.0))
     # Sides that do not face each other see nothing of an overlap, nor of one beside them.
-    resolved &= resolves and inside <= 2 * found.depth and beside - least <= rounding
+    resolved &= inside <= 2 * found.depth and beside - max(least, 0.0) <= rounding
+    coarse = bool((alone & (found.depths > least + rounding)).any())
+    resolved &= not body.comm.allreduce(coarse, op=MPI.LOR)
     drawn = max(found.depth, *overlap) > rounding
     if depth <= rounding or (resolved and (press or not drawn)):
         return

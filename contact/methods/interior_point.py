@@ -283,31 +283,33 @@ SHORTEST, LONGEST = 0.9, 0.999
 
 
 def interior_point(
-    newton: SemismoothNewton, begin: State | None = None, steps: int | None = None
+    semismooth: SemismoothNewton, begin: State | None = None, steps: int | None = None
 ) -> tuple[State, Outcome]:
     """Solve by the interior point, Newton's last steps and updates of the bound. Collective.
 
     `begin` is a state without contact, whose gaps are the first slacks; None where contact has to
     constrain a rigid-body mode or the potential. At most as many `steps`, those left by default.
     """
-    problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
-    last_step = len(newton.recorder.records) + (newton.steps_left if steps is None else steps)
+    problem, modes, interface = semismooth.problem, semismooth.modes, semismooth.problem.interface
+    last_step = len(semismooth.recorder.records) + (
+        semismooth.steps_left if steps is None else steps
+    )
 
     def steps_left() -> int:
-        return last_step - len(newton.recorder.records)
+        return last_step - len(semismooth.recorder.records)
 
     bound: Array = np.zeros(interface.nodes.weight.size)
     aside: tuple[State, Outcome] | None = None
     best = 1.0
     for _ in range(UPDATES):
-        method = InteriorPoint(newton, bound, begin)
+        method = InteriorPoint(semismooth, bound, begin)
         outcome, state = method.iterate(min(LIMIT, steps_left())), method.state
         last = state
         if not outcome.converged and steps_left() > 0:
             # Another bound may constrain a body whose matrix is singular.
             with suppress(SingularError):
-                last, outcome = newton.iterate(
-                    newton.started(state), note=INTERIOR_POINT, steps=steps_left()
+                last, outcome = semismooth.iterate(
+                    semismooth.started(state), note=INTERIOR_POINT, steps=steps_left()
                 )
         if outcome.converged and modes.unconstrained_at(problem, last):
             aside = last, outcome
@@ -339,9 +341,9 @@ class InteriorPoint:
     `begin` is a state whose gaps are the first slacks; None for none.
     """
 
-    def __init__(self, newton: SemismoothNewton, bound: Array, begin: State | None) -> None:
-        problem = newton.problem
-        self.problem, self._newton, self._step = problem, newton, newton.step
+    def __init__(self, semismooth: SemismoothNewton, bound: Array, begin: State | None) -> None:
+        problem = semismooth.problem
+        self.problem, self._semismooth, self._step = problem, semismooth, semismooth.step
         interface = problem.interface
         nodes, self._state = interface.nodes, problem.start()
         # A layer without a rigid part bears friction too, without a unilateral constraint.
@@ -377,7 +379,7 @@ class InteriorPoint:
 
     def iterate(self, most: int = LIMIT) -> Outcome:
         """Take steps until the duality gap is closed, or as many as given. Collective."""
-        newton = self._newton
+        semismooth = self._semismooth
         self._evaluated = evaluate_state(self.problem, self.state)
         ended = "the interior point was given no step"
         for steps in range(1, most + 1):
@@ -390,8 +392,8 @@ class InteriorPoint:
                 taken = False
             self._evaluated = evaluate_state(self.problem, self.state)
             state, residuals = self._evaluated.state, self._evaluated.residuals
-            newton.see(state, residuals)
-            newton.recorder.record(residuals, INTERIOR_POINT, 2)
+            semismooth.see(state, residuals)
+            semismooth.recorder.record(residuals, INTERIOR_POINT, 2)
             ended = f"the interior point has not converged in {steps} steps"
             if not taken or not np.isfinite(residuals.significant):
                 ended = f"rounding ends the interior point after {steps} steps"
@@ -407,7 +409,7 @@ class InteriorPoint:
             if gap <= CLOSED and (balanced or 0 < gap <= CLOSED**2):
                 ended = f"duality gap closed after {steps} steps"
                 break
-        return Outcome(self._evaluated.residuals, newton.options.allowed, ended)
+        return Outcome(self._evaluated.residuals, semismooth.options.allowed, ended)
 
     @property
     def state(self) -> State:

@@ -133,21 +133,21 @@ class ConvergenceMonitor:
 
     def __init__(
         self,
-        newton: SemismoothNewton,
+        semismooth: SemismoothNewton,
         state: State,
         note: str = "",
         stagnation_limit: int | None = None,
     ) -> None:
-        self._newton, self._note = newton, note
-        self._problem, self._options = newton.problem, newton.options
+        self._semismooth, self._note = semismooth, note
+        self._problem, self._options = semismooth.problem, semismooth.options
         limit = stagnation_limit or self._options.stagnation_limit
         self._stagnation = Stagnation(limit, PROGRESS, cumulative=True)
         self.iterate = evaluate_state(self._problem, state)
         self._pressed = self._largest_pressure(state)
         self.starts_converged = state.active_set is not None and self.converged
         if self.starts_converged:
-            newton.see(state, self.residuals)
-            newton.recorder.record(self.residuals, f"{note} initial guess".strip(), inner=0)
+            semismooth.see(state, self.residuals)
+            semismooth.recorder.record(self.residuals, f"{note} initial guess".strip(), inner=0)
 
     @property
     def residuals(self) -> Residuals:
@@ -162,13 +162,13 @@ class ConvergenceMonitor:
     def evaluate(self, state: State) -> None:
         """Evaluate the residuals of an iterate. Collective."""
         self.iterate = evaluate_state(self._problem, state)
-        self._newton.see(state, self.residuals)
+        self._semismooth.see(state, self.residuals)
 
     def record(self, *words: str, steps: tuple[Record, ...] = ()) -> None:
         """Record the step to the last iterate. Collective."""
         note = " ".join(word for word in (self._note, *words) if word)
         sizes = _node_counts(self.iterate.state, self._problem)
-        self._newton.recorder.record(self.residuals, note, sizes=sizes, steps=steps)
+        self._semismooth.recorder.record(self.residuals, note, sizes=sizes, steps=steps)
 
     def ended(self) -> tuple[State, Outcome] | None:
         """Return the end by convergence, divergence, or loss of contact; else None. Collective."""
@@ -198,7 +198,7 @@ class ConvergenceMonitor:
 
     def out_of_steps(self) -> Outcome:
         """Return the outcome at the limit of steps."""
-        return self.outcome(f"not converged in {len(self._newton.recorder.records)} steps")
+        return self.outcome(f"not converged in {len(self._semismooth.recorder.records)} steps")
 
     def outcome(self, ended: str = "") -> Outcome:
         """Return the outcome at the last iterate."""
@@ -224,9 +224,9 @@ class ConvergenceMonitor:
             found.state, active_set=state.active_set, layer_pressure=state.layer_pressure
         )
         self.iterate = replace(found, state=undeformed)
-        self._newton.see(undeformed, self.residuals)
+        self._semismooth.see(undeformed, self.residuals)
         words = f"{self._note} zero displacement".strip()
-        self._newton.recorder.record(self.residuals, words, inner=0)
+        self._semismooth.recorder.record(self.residuals, words, inner=0)
         return undeformed, self.outcome()
 
 

@@ -197,16 +197,14 @@ def foundation(run: Run, scale: float) -> Any:
             continue
         way = scalings(run, table, None)[0]
         more = (scale - 1) * way.more
-        if entry in run.shapes:
+        if entry in run.shapes and (entry in run.motions or entry not in run.moving):
             facets = body[faces[(skin["entry"] == entry)[faces].all(axis=1)]].mean(axis=1)
             motion = run.motions.get(entry, np.zeros(6))
             known.append(_placed(run.shapes[entry], motion, table, more, facets, run.diameter))
         else:
             own = run.table["entry"] == entry
-            distance[own], gap[own] = (
-                way.distance + more,
-                way.distance + more - scale * way.approach,
-            )
+            distance[own] = way.distance + more
+            gap[own] = distance[own] - scale * way.approach
     places = skin.points + np.where(row < 0, np.nan, distance[row])[:, None] * skin["normal"]
     found = facing(places[faces], gap[row][faces], run.diameter)
     if known:

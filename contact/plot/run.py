@@ -190,13 +190,13 @@ def _foundations(case: str) -> tuple[dict[int, Shape], dict[int, tuple[str, Arra
 def _motions(
     moving: Mapping[int, tuple[str, Array]], columns: Mapping[str, float]
 ) -> dict[int, Array]:
-    """Return `Run.motions` from the columns of motions."""
+    """Return `Run.motions` from the columns of motions, of those that have these."""
     found = {}
     for contact, (end, centre) in moving.items():
-        shift, turn = (
-            np.array([columns[f"{name}_{axis}{end}"] for axis in "xyz"], dtype=float)
-            for name in ("rigid", "rigid_rotation")
-        )
+        names = [f"{key}_{axis}{end}" for key in ("rigid", "rigid_rotation") for axis in "xyz"]
+        if not columns.keys() >= {*names}:
+            continue
+        shift, turn = np.reshape([float(columns[name]) for name in names], (2, 3))
         turn = np.radians(turn)
         found[contact] = np.concatenate([shift - np.cross(turn, centre), turn])
     return found

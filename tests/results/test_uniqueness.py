@@ -330,7 +330,8 @@ def test_a_constant_pressure_is_constant_on_both_sides(dim: int, degree: int) ->
     # On all ranks together, for the next line is collective. Contact alone holds the upper block:
     # on three ranks its solution has 2e-10 of rounding, on one 1e-13.
     most = [COMM.allreduce(np.abs(each).max(initial=0.0), op=MPI.MAX) for each in away]
-    np.testing.assert_array_less(most, [1e-9, 1e-9, 1e-12])
+    exact = 1e-11 if COMM.size < 3 else 1e-9
+    np.testing.assert_array_less(most, [exact, exact, 1e-12])
     assert COMM.allreduce(fields["weight"].sum()) == pytest.approx(1.0)
 
 
