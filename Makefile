@@ -76,7 +76,7 @@ docs:
 	@echo "build/docs/index.html"
 
 release:
-	$(FX) python3 -m pytest tests/scripts/test_release.py -m "release or not release" -q
+	$(FX) python3 -m pytest tests/scripts/test_release.py -m "release or not release" -q -o faulthandler_timeout=0
 
 clean:
 	rm -rf results build .pytest_cache .mypy_cache .ruff_cache .hypothesis
