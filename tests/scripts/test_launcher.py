@@ -119,6 +119,16 @@ def test_a_second_start_waits_for_the_first(launcher, place):
     assert "waiting for it" in err
 
 
+def test_what_a_killed_start_has_begun_is_finished(launcher, place):
+    with launcher.start("true", FAKE_SECONDS="2") as first:
+        while launcher.calls() == 0:
+            time.sleep(0.05)
+        first.kill()
+        status, _, err = launcher.run("true")
+    assert (status, launcher.calls()) == (0, 1)
+    assert "waiting for it" in err
+
+
 def test_nothing_is_left_of_a_failure(launcher, place):
     status, _, err = launcher.run("true", FAKE_FAILURE="yes")
     assert (status, launcher.places()) == (UNAVAILABLE, [])
