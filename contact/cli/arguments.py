@@ -33,20 +33,9 @@ PETSc's options have one dash, those of the linear solver the prefix contact_, a
 FLAG: dict[str, Any] = {"action": "store_true"}
 MANY: dict[str, Any] = {"action": "append", "default": []}
 
-#: Options of one letter: argparse would take PETSc's, -help or -vec_view, for several of them.
-SHORT = {"-h": "--help", "-v": "--verbose"}
 
 #: Names of arguments that are no options.
 POSITIONAL = ("command", "case", "folder", "name", "mesh", "data", "keys", "file", "to")
-
-#: The one positional argument of a command, where that is no case file.
-ONE = {
-    "new": "mesh file",
-    "mesh": "mesh file and the name of the new one",
-    "plot": "folder with results",
-    "view": "folder with results",
-    "materials": 'name of a material, in quotes where it has spaces: "PZT-4 Clevite"',
-}
 
 #: Files whose keys and columns the help of a command lists.
 FILES = {
@@ -83,8 +72,10 @@ class Parser(argparse.ArgumentParser):
 
 def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     """Split a command line into our options and PETSc's; InputError if it is not understood."""
-    given = [SHORT.get(argument, argument) for argument in arguments]
-    options, rest = parser()[0].parse_known_args(given)
+    # As an option of argparse, -h would take PETSc's -history for several of one letter.
+    given = ["--help" if argument == "-h" else argument for argument in arguments]
+    whole, commands = parser()
+    options, rest = whole.parse_known_args(given)
     known = [f"--{name}" for name in vars(options) if name not in POSITIONAL]
     known.append("--help")
     for i, argument in enumerate(rest):
@@ -95,9 +86,9 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
                 f"{argument}: unknown option{hint}; accepted: {', '.join(known)}", "command-line"
             )
         if not argument.startswith("-") and not follows:
-            one = ONE.get(options.command, "case file")
+            usage = commands[options.command].usage
             raise InputError(
-                f"{argument}: one argument too many; accepted: one {one}", "command-line"
+                f"{argument}: one argument too many; accepted: {usage}", "command-line"
             )
     return options, rest
 
@@ -125,11 +116,8 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
         "may be repeated",
     )
     quiet = common("--quiet", **FLAG, help="show no progress")
-    told = [
-        quiet,
-        common("--verbose", **FLAG, help="-v: show all iterations and remarks, with the time"),
-        common("--log", metavar="FILE", help="write a log to the end of a file"),
-    ]
+    log = "write all iterations and remarks, with the time, to the end of a file"
+    told = [quiet, common("--log", metavar="FILE", help=log)]
     overwrite = common(
         "--overwrite", **FLAG, help="replace results or checkpoints of another case, if DIR has any"
     )
@@ -190,10 +178,10 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
         parents=[case, replaced, quiet],
     )
     materials = command(
-        "materials [NAME] [--file FILE]",
+        'materials ["NAME"] [--file FILE]',
         "list the materials that have a name, or show one with its derived constants",
     )
-    schema = command(
+    command(
         "schema",
         "print the JSON schema of the case file, by which editors complete and check TOML",
         epilog="contact schema > contact.schema.json, and as the first line of a case file\n"
@@ -281,5 +269,4 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
     identify.add_argument("--plot", metavar="FILE", help="draw fit and residuals into a new file")
     materials.add_argument("name", metavar="NAME", help="material to show", nargs="?")
     materials.add_argument("--file", metavar="FILE", help="a library of one's own (TOML)")
-    every = (demo, new, mesh, check, solve, sweep, plot, view, identify, materials, schema)
-    return whole, {one.prog.rpartition(" ")[2]: one for one in every}
+    return whole, dict(commands.choices)

@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 from mpi4py import MPI
 
+from contact.arguments import expect
 from contact.case.file import load_case
 from contact.cli.main import CONVERGED
 from contact.cli.progress import progress
@@ -17,6 +18,7 @@ from contact.derivatives.identification import TIME, Identified, identify
 from contact.errors import InputError
 from contact.io.folder import on_root
 from contact.model.data import read_data
+from contact.plot.figures import FORMATS
 from contact.plot.style import BLUE, GREY, ORANGE, STYLE, sheet
 from contact.typing import Array
 
@@ -46,18 +48,10 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 
 def _check_free(path: Path | None) -> None:
     """Refuse a figure that would replace a file, or that nothing could draw."""
-    if path is None:
-        return
-    if path.suffix not in (".png", ".pdf", ".svg"):
-        raise InputError(
-            f"--plot {path}: accepted: a file that ends in .png, .pdf or .svg", "plot-file"
-        )
-    if not path.parent.is_dir():
-        raise InputError(
-            f"--plot {path}: there is no such folder; accepted: one that is there", "plot-file"
-        )
-    if path.exists():
-        raise InputError(f"--plot {path}: it exists; accepted: a new file", "plot-file")
+    if path is not None:
+        accepted = f"a new file, {', '.join(f'.{ending}' for ending in FORMATS)}, in a folder"
+        fits = path.suffix[1:] in FORMATS and path.parent.is_dir() and not path.exists()
+        expect("--plot", str(path), accepted, fits, "plot-file")
 
 
 def _bound(text: str) -> tuple[str, tuple[float, float]]:

@@ -17,7 +17,7 @@ from contact.case.file import literal
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.interface.pairing import REACH
-from contact.mesh.domain import ON_AXIS, Domain
+from contact.mesh.domain import ON_AXIS, Domain, Indices
 from contact.mesh.entities import distributed_components
 from contact.mesh.geometry import facet_normals, geometry_nodes
 from contact.mesh.reader import convert, from_file
@@ -164,15 +164,21 @@ def _heights(domain: Domain) -> dict[str, float]:
     # Of a body of revolution those on its axis are no parts of its boundary.
     revolved, found = domain.space.get("kinematics") == "axisymmetric", {}
     for name, facets in domain.parts.items():
-        middles = np.empty((0, 3))
-        if facets.size > 0:  # dolfinx divides by their number
-            middles = dmesh.compute_midpoints(domain.mesh, domain.dim - 1, facets)
-        sums = [middles[:, domain.dim - 1].sum(), np.abs(middles[:, 0]).sum(), len(middles)]
+        middles = _middles(domain, facets)
+        sums = [middles[:, -1].sum(), np.abs(middles[:, 0]).sum(), len(middles)]
         total = domain.comm.allreduce(np.array(sums), op=MPI.SUM)
         height, radius = total[:2] / total[2] / domain.size
         if not revolved or radius > ON_AXIS:
             found[name] = round(float(height), 6)
     return found
+
+
+def _middles(domain: Domain, facets: Indices) -> Array:
+    """Return the midpoints of facets of this rank, shape (f, d)."""
+    if not facets.size:  # dolfinx divides by their number
+        return np.empty((0, domain.dim))
+    found = dmesh.compute_midpoints(domain.mesh, domain.dim - 1, facets)
+    return np.asarray(found[:, : domain.dim])
 
 
 class _Side(NamedTuple):
@@ -228,14 +234,11 @@ def _least_gap(one: _Side, other: _Side, reach: float) -> float:
 def _side(domain: Domain, name: str, bodies: Array) -> _Side:
     """Return the facets of a part, given the body of each cell of this rank. Collective."""
     cells, _, areas = facet_normals(domain, name, 1)
-    facets, d = domain.facets(name), domain.dim
-    middle: Array = np.empty((0, d))
-    if facets.size > 0:  # dolfinx divides by their number
-        middle = dmesh.compute_midpoints(domain.mesh, d - 1, facets)[:, :d]
+    middle = _middles(domain, domain.facets(name))
     area = areas.mean(axis=1)
     size = np.linalg.norm(area, axis=1)
     normal = area / size[:, None]
     behind = middle[:, None] - geometry_nodes(domain, cells.astype(np.int32))
     height = np.einsum("fkd,fd->fk", behind, normal).max(axis=1, initial=0.0)
-    own = middle, normal, size ** (1 / (d - 1)), height, bodies[cells]
+    own = middle, normal, size ** (1 / (domain.dim - 1)), height, bodies[cells]
     return _Side(*(np.concatenate(domain.comm.allgather(values)) for values in own))

@@ -6,7 +6,6 @@ import logging
 import platform
 import shlex
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -32,26 +31,24 @@ def progress(
     comm: MPI.Intracomm,
     quiet: bool = False,
     log: str | None = None,
-    verbose: bool = False,
     over: str = OUTER,
 ) -> Iterator[Monitor | None]:
     """Show the log of ``contact`` on rank 0 and yield the monitor that shows the iterations.
 
-    Iterations are shown as a table, and the steps or cases that a run is `over` as lines. If
-    `quiet` warnings alone are shown, if `verbose` all records with the time, which are written to
-    the end of a `log` too.
+    Iterations are shown as a table, and the steps or cases that a run is `over` as lines; if
+    `quiet` warnings alone. All records are written, with the time, to the end of a `log`.
     """
     handlers: list[logging.Handler] = [logging.NullHandler()] if comm.rank > 0 else []
     on_root(comm, lambda: handlers.append(_log(log)) if log is not None else None)
     monitor = None
     if comm.rank == 0:
         bar = None
-        if not (quiet or verbose) and sys.stderr.isatty():
+        if not quiet and sys.stderr.isatty():
             from tqdm import tqdm
 
             total, words = (None, COUNT) if over == OUTER else (1, SHARES)
             bar = tqdm(file=sys.stderr, leave=False, total=total, bar_format=words)
-        monitor = Console(over, quiet, verbose, bar)
+        monitor = Console(over, quiet, bar)
         handlers.append(monitor)
     logger = logging.getLogger("contact")
     level = logger.level
@@ -71,10 +68,10 @@ def progress(
 class Console(logging.Handler):
     """Prints the table of iterations, or the lines that a run is over, above a bar of tqdm."""
 
-    def __init__(self, over: str, quiet: bool, verbose: bool, bar: Any = None) -> None:
-        super().__init__(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
-        self._over, self._verbose, self._bar = over, verbose, bar
-        self._table = over == OUTER and not (quiet or verbose)
+    def __init__(self, over: str, quiet: bool, bar: Any = None) -> None:
+        super().__init__(logging.WARNING if quiet else logging.INFO)
+        self._over, self._bar = over, bar
+        self._table = over == OUTER and not quiet
         self._headed = False
 
     def __call__(self, record: Record) -> None:
@@ -88,11 +85,9 @@ class Console(logging.Handler):
             self._bar.update(1)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show a line: any with the time, warnings, or those that the run is over."""
+        """Show a line: a warning, or one that the run is over."""
         text, name = record.getMessage(), record.name
-        if self._verbose:
-            self._write(f"{time.strftime('%H:%M:%S')} {text}")
-        elif record.levelno >= logging.WARNING:
+        if record.levelno >= logging.WARNING:
             self._write(f"warning: {text}")
         elif name == self._over != OUTER and self._bar is not None:
             self._bar.n = getattr(record, "share", self._bar.n)

@@ -14,12 +14,11 @@ from matplotlib.colors import to_hex, to_rgba
 from matplotlib.figure import Figure
 from scipy.spatial import KDTree
 
-from contact import _compat
 from contact.case.file import Case
 from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
-from contact.mesh.geometry import facet_normals
+from contact.mesh.geometry import facet_normals, geometry_nodes
 from contact.model.fields import at_time
 from contact.plot.foundation import add_foundation, facing
 from contact.plot.run import polygons
@@ -57,7 +56,8 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
         return None if shares is None else np.concatenate(shares)
 
     boundary = gathered(_corners(domain, exterior_facets(domain.mesh)))
-    cells = gathered(_cells(domain) if domain.dim == 2 else None)
+    around = facet_of(shape_of(domain.mesh).corners).around if domain.dim == 2 else []
+    cells = gathered(geometry_nodes(domain)[:, around])
     parts = [(words, *map(gathered, rest)) for words, *rest in _parts(case, problem)]
     surface = _foundation(problem)
     if comm.rank > 0:
@@ -113,14 +113,6 @@ def _corners(domain: Domain, facets: Indices) -> Array:
         return np.empty((0, shape.corners, domain.dim))
     places = dmesh.entities_to_geometry(domain.mesh, domain.dim - 1, facets)
     return np.asarray(domain.mesh.geometry.x[places[:, shape.around]][..., : domain.dim])
-
-
-def _cells(domain: Domain) -> Array:
-    """Return the corners of plane cells that this rank owns, around each, shape (n, c, 2)."""
-    owned = domain.mesh.topology.index_map(2).size_local
-    corners = _compat.geometry_dofmap(domain.mesh)[:owned, : shape_of(domain.mesh).corners]
-    around = facet_of(corners.shape[1]).around
-    return np.asarray(domain.mesh.geometry.x[corners[:, around]][..., :2])
 
 
 def _foundation(problem: ContactProblem) -> Array:

@@ -66,7 +66,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
         if not options.overwrite:
             on_root(comm, lambda: _check_results(folder.path, case))
         over = OUTER if case.evolution is None else STEPS
-        with progress(comm, options.quiet, options.log, options.verbose, over) as monitor:
+        with progress(comm, options.quiet, options.log, over) as monitor:
             try:
                 solution = solve_and_keep(case, monitor, comm, folder.path, restart)
             except SolveInterrupted as interrupt:
@@ -195,7 +195,7 @@ def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not options.out:
         raise InputError("--out: missing; accepted: a folder to write to", "missing")
     axes = [Axis.of(text) for text in options.over]
-    shown = progress(comm, options.quiet, options.log, options.verbose, SWEEP)
+    shown = progress(comm, options.quiet, options.log, SWEEP)
     with result_folder(options.out, comm, overwrite=True) as folder, shown as monitor:
         rows = sweep(
             options.case,

@@ -15,18 +15,10 @@ WRONG = {
     "a typing error in a key": ("poisson", "poison", "material.poison"),
     "a negative size": ("[2.0, 1.0]", "[2.0, -1.0]", "mesh.size"),
     "an unknown part": ('on = "bottom"', 'on = "botom"', "contact.on"),
-    "a load on the contact part": (
-        'on = "top"',
-        'on = "bottom"',
-        "load.0.on",
-    ),
+    "a load on the contact part": ('on = "top"', 'on = "bottom"', "load.0.on"),
     "a load that is not finite": ("-0.001", '"log(x-1)"', "load.0.traction.1"),
     "a load that overflows": ("-0.001", "-1e300", "load.0.traction.1"),
-    "more cells than memory": (
-        "[4, 2]",
-        "[1000000, 1000000]",
-        "mesh.cells",
-    ),
+    "more cells than memory": ("[4, 2]", "[1000000, 1000000]", "mesh.cells"),
     "a displacement that is not finite": (
         "[0.0, 0.0]",
         '[0.0, "log(y-0.5)"]',
@@ -86,11 +78,12 @@ def test_the_base_case_is_right(shared_tmp_path: Path, capfd: pytest.CaptureFixt
 
 
 @pytest.mark.core
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("name", WRONG)
 def test_wrong_case_file(
     name: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit status 2, the key and the identifier; nothing is written."""
+    """Exit status 2 on all ranks, the key and the identifier; nothing is written."""
     old, new, key = WRONG[name]
     assert old in BAR
     refuse(write(shared_tmp_path, BAR.replace(old, new, 1)), [key], capfd)
@@ -122,29 +115,3 @@ def test_missing_files(shared_tmp_path: Path, capfd: pytest.CaptureFixture[str])
     """Missing case and mesh files are named."""
     refuse(shared_tmp_path / "nothing.toml", ["No such file"], capfd)
     refuse(write(shared_tmp_path, MESH.format(file="absent.msh")), ["absent.msh"], capfd)
-
-
-@pytest.mark.core
-@pytest.mark.parallel(2)
-@pytest.mark.parametrize(
-    "name",
-    [
-        "an unknown part",
-        "a displacement that is not finite",
-        "a load that is not finite",
-        "a load that overflows",
-        "more cells than memory",
-        "a gap that is not finite",
-        "a sphere around a contact node",
-        "a plane that faces away",
-        "a plane through the body",
-        "friction negative somewhere",
-        "contact nodes that are all fixed",
-        "a body that can slide",
-    ],
-)
-def test_all_ranks_refuse_together(
-    name: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """What only some ranks can see makes all of them leave, with one message."""
-    test_wrong_case_file(name, shared_tmp_path, capfd)

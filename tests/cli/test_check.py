@@ -117,16 +117,6 @@ def test_a_curved_part_has_a_mean_normal():
     assert "not plane, mean normal (0.57" in text
 
 
-def block(**more):
-    return {
-        "mesh": MESH,
-        "material": {"young": 1e3, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, "free"]}],
-        "contact": {"on": "bottom"},
-        **more,
-    }
-
-
 SMALL = {
     "hertz": ("mesh.contact_size=0.5",),
     "hertz-sphere": (),

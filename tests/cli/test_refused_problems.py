@@ -12,6 +12,7 @@ from mpi4py import MPI
 from contact.cli.main import CONVERGED, NOT_CONVERGED, main
 from contact.model.messages import LIST
 from tests.cli.running import BAR, PIEZO, check_identifier, refuse, run, write
+from tests.problems import bar
 
 
 @pytest.mark.core
@@ -114,21 +115,10 @@ def test_not_converged_writes_outputs(
     assert "not converged in 1 outer iterations" in summary
 
 
-TABLES = {
-    "mesh": 'generator = "rectangle"\nsize = [4.0, 1.0]\ncells = [8, 2]',
-    "mesh.parts.loaded": 'side = "top"\nfrom = 2.0\nto = 4.0',
-    "material": 'law = "log"\nyoung = 1.0\npoisson = 0.3\nyield_strain = 0.05',
-    "[fixed]": 'on = "left"\ndisplacement = [0.0, 0.0]\npotential = 0.0',
-    "material.piezo": "e31 = -5.4\ne33 = 15.8\ne15 = 12.3\nbeta11 = 8.1\nbeta33 = 7.3",
-    "[load]": 'on = "loaded"\ntraction = [0.0, -0.005]',
-    "contact": 'on = "bottom"',
-    "friction": 'law = "coulomb"\nmu = 0.3',
-}
-D400, D5000, X5000 = "1" + "0" * 400, "9" * 5000, "0x" + "f" * 5000
+D400, D5000 = "1" + "0" * 400, "9" * 5000
 LONG = "k" * 5000
-GEOMETRY = (TABLES["mesh.parts.loaded"], 'side = "top"')
 
-#: Name -> replacements of text in the tables.
+#: Name -> replacements of text in the bar.
 FILES = {
     "400 digits as traction": ("-0.005", D400),
     "5000 digits": ("young = 1.0", f"young = {D5000}"),
@@ -157,8 +147,8 @@ OVERRIDES = {
 
 
 def case(*changes):
-    """Return the text of a case in which texts are replaced by others: old, new, old, new."""
-    text = "\n".join(f"[{name}]\n{table}" for name, table in TABLES.items())
+    """Return the text of the bar in which texts are replaced by others: old, new, old, new."""
+    text = bar.BAR
     for old, new in zip(changes[::2], changes[1::2], strict=True):
         assert old in text
         text = text.replace(old, new, 1)

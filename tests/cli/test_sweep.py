@@ -1,15 +1,11 @@
 """contact sweep: one row a value, resumable, warm-started, over several keys."""
 
-from pathlib import Path
-
 import pytest
 
 from contact.cli.main import main
 from contact.plot.series import read_sweep, sweep_figure
 from tests.problems.bar import BAR
 from tests.problems.written import rows_of
-
-ROOT = Path(__file__).parents[2]
 
 RUNS = (
     "converged",
