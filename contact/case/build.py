@@ -169,7 +169,8 @@ def _contacts(
         )
     made = []
     for key, contact in case.contacts:
-        friction, electric = case.friction_of(key, contact)[1], case.electric_of(key, contact)[1]
+        friction = contact.friction or case.friction or Friction()
+        _, electric = case.electric_of(key, contact)
         if coefficient is not None or law is not None:
             friction = Friction(coefficient, radius=friction.radius, law=law)
         if electric is not None and electric.amplitude is not None:

@@ -148,7 +148,7 @@ def _check_potential(case: Case) -> None:
 
 def _check_contacts(case: Case) -> None:
     """Raise a fault unless each contact is of a part of its own, which can move."""
-    seen: dict[str, str] = {}
+    _check_once((path, part) for path, one in case.contacts for part in members(one.on))
     for path, contact in case.contacts:
         for i, fixed in enumerate(case.fixed):
             fits = not fixed.is_clamped or {*members(contact.on)} - {*members(fixed.on)}
@@ -162,9 +162,6 @@ def _check_contacts(case: Case) -> None:
             fits = section is None or not section.lagged or case.solver.method != "newton"
             accepted = 'lagged with solver.method = "uzawa" or "penalty"'
             case.require(fits, f"{place}.lagged", accepted)
-        for part in members(contact.on):
-            if seen.setdefault(part, path) != path:
-                raise fault(f"{path}.on", part, f"a part that {seen[part]} does not have")
     for key in ("friction", "electric"):
         own = [getattr(contact, key) is not None for _, contact in case.contacts]
         if all(own) and getattr(case, key) is not None:
@@ -175,13 +172,18 @@ def _check_contacts(case: Case) -> None:
 
 def _check_regions(case: Case) -> None:
     """Raise a fault unless each of several materials has regions of its own."""
-    seen: dict[str, str] = {}
     for path, material in case.materials:
         fits = material.on is not None or len(case.materials) == 1
         case.require(fits, f"{path}.on", "regions for each of several materials")
-        for name in material.on or ():
-            if seen.setdefault(name, path) != path:
-                raise fault(f"{path}.on", name, f"regions that {seen[name]} does not have")
+    _check_once((path, name) for path, one in case.materials for name in one.on or ())
+
+
+def _check_once(named: Iterable[tuple[str, str]]) -> None:
+    """Raise a fault if a part or region, with the path of its section, has two of these."""
+    seen: dict[str, str] = {}
+    for path, name in named:
+        if seen.setdefault(name, path) != path:
+            raise fault(f"{path}.on", name, f"one that {seen[name]} does not have")
 
 
 def _check_rigid(case: Case) -> None:
@@ -194,10 +196,8 @@ def _check_rigid(case: Case) -> None:
             accepted = "0 across the axis of a body of revolution, and no rotation"
             raise fault(f"{path}.{key}", Words("given"), accepted, "rigid-part")
     for key in ("rigid", "electrode", "bolt"):
-        parts = [section.on for section in getattr(case, key)]
-        for i, on in enumerate(parts):
-            fits = not any(meet(on, other) for other in parts[:i])
-            case.require(fits, f"{key}.{i}.on", f"a part that no other [[{key}]] has")
+        sections = enumerate(getattr(case, key))
+        _check_once((f"{key}.{i}", part) for i, one in sections for part in members(one.on))
 
 
 def _check_units(case: Case) -> None:

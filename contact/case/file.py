@@ -183,14 +183,8 @@ class Case(Section):
         """Return the sections of some kinds, each with its key in the file."""
         return tuple(entry for entry in walk(self) if isinstance(entry[1], kinds))
 
-    def friction_of(self, key: str, contact: Contact) -> tuple[str, Friction]:
-        """Return the friction of a contact, with its key in the file."""
-        if contact.friction is not None:
-            return f"{key}.friction", contact.friction
-        return "friction", self.friction or Friction()
-
     def electric_of(self, key: str, contact: Contact) -> tuple[str, Electric | None]:
-        """Return the electric contact of a contact, likewise."""
+        """Return the electric contact of a contact, with its key in the file."""
         if isinstance(contact.electric, Electric):
             return f"{key}.electric", contact.electric
         return "electric", self.electric

@@ -36,12 +36,15 @@ from contact.model.section import (
     as_tuple,
 )
 from contact.ranks import on_all_ranks
-from contact.settings import Accepted, Count, Number, Positive, Words, fault
+from contact.settings import Accepted, Count, Number, Positive, ReadWith, fault
 from contact.typing import Array
 from meshes.grading import memory
 
 #: Keys of `[mesh]` that go with every generator and file.
 COMMON = tuple("generator file cell order rotation axis refine adapt inside regions".split())
+
+#: Generators that take lists of sizes and cells.
+GRIDS = ("rectangle", "box")
 
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
 CELL_MEMORY = 200
@@ -62,11 +65,6 @@ class Piece(Section):
     box in the order x, y, z). Absent: at its end."""
     stop: Along | None = Field(default=None, alias="to")
     """Where the piece ends. Both are positions of the grid."""
-
-    @property
-    def on_grid(self) -> grid.Piece:
-        """The piece as the grid takes it."""
-        return grid.Piece(self.side, self.start, self.stop)
 
 
 Pieces: TypeAlias = Annotated[
@@ -119,25 +117,33 @@ class Mesh(Section):
     file: Annotated[File, Accepted(ACCEPTED)] | None = None
     """Mesh file; its named sets, those of Gmsh physical groups, are the parts and regions. Relative
     to the case file."""
-    origin: Vector | None = None
-    """Lower left corner of a rectangle or box. Default: zeros."""
-    size: (
+    origin: Annotated[Vector | None, ReadWith("generator", GRIDS)] = None
+    """Lower left corner. Default: zeros."""
+    size: Annotated[
         Annotated[Few[Positive], Accepted("a list of 2 numbers > 0 for a rectangle, 3 for a box")]
-        | None
-    ) = None
-    """Edge lengths of a rectangle or box; required there."""
-    cells: (
+        | None,
+        ReadWith("generator", GRIDS, required=True),
+    ] = None
+    """Edge lengths."""
+    cells: Annotated[
         Annotated[
             Few[Count],
             Accepted("a list of 2 whole numbers from 1 to 10000000 for a rectangle, 3 for a box"),
         ]
-        | None
-    ) = None
-    """Squares or cubes along the edges; required for a rectangle or box."""
-    diagonal: Literal["right", "left", "crossed", "left_right", "right_left"] | None = None
-    """How a rectangle's squares are cut into triangles; there "right" by default, and "crossed" in
-    a body of revolution of degree 1 that reaches its axis."""
-    cell: Literal["triangle", "quadrilateral", "tetrahedron", "hexahedron"] | None = None
+        | None,
+        ReadWith("generator", GRIDS, required=True),
+    ] = None
+    """Squares or cubes along the edges."""
+    diagonal: Annotated[
+        Literal["right", "left", "crossed", "left_right", "right_left"] | None,
+        ReadWith("generator", "rectangle"),
+    ] = None
+    """How squares are cut into triangles. Default: "right", and "crossed" in a body of revolution
+    of degree 1 that reaches its axis."""
+    cell: Annotated[
+        Literal["triangle", "quadrilateral", "tetrahedron", "hexahedron"] | None,
+        ReadWith("generator"),
+    ] = None
     """Shape of the cells of a generator: in 2-D "triangle" or "quadrilateral", in 3-D "tetrahedron"
     or "hexahedron". Default: the first of them."""
     order: Annotated[int, Field(ge=1, le=2), Accepted("1 or 2")] = 1
@@ -152,8 +158,8 @@ class Mesh(Section):
     """Uniform refinements of the mesh after it is made or read."""
     adapt: Adapt | None = None
     """Adaptive refinement, `[mesh.adapt]`. Default: none."""
-    parts: dict[Name, Pieces] = Field(default={})
-    """Further parts of a rectangle or box by name: `[mesh.parts.NAME]`."""
+    parts: Annotated[dict[Name, Pieces], ReadWith("generator", GRIDS)] = Field(default={})
+    """Further parts by name: `[mesh.parts.NAME]`."""
     inside: dict[Name, StaticValue] = Field(default={})
     """Parts inside of the body by name, of any mesh: the facets at all of whose corners a formula
     is not 0, such as `middle = "abs(y - 0.5) < 1e-6"`, in the coordinates before rotation.
@@ -181,14 +187,6 @@ class Mesh(Section):
         """Space dimension; None if only the mesh itself can tell."""
         return len(self.sides) // 2 or None
 
-    @property
-    def pieces(self) -> dict[str, grid.Piece | list[grid.Piece]]:
-        """The further parts of a rectangle or box."""
-        return {
-            name: [piece.on_grid for piece in given] if isinstance(given, tuple) else given.on_grid
-            for name, given in self.parts.items()
-        }
-
     @model_validator(mode="before")
     @classmethod
     def _gather_parameters(cls, given: Any) -> Any:
@@ -211,36 +209,20 @@ class Mesh(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if (self.generator is None) == (self.file is None):
-            given = "neither generator nor file" if self.file is None else "generator and file"
-            raise fault("generator", Words(given), "one of generator and file", "exclusive-keys")
-        fits = self.diagonal is None or self.generator == "rectangle"
-        self.require(fits, "diagonal", "diagonal for a rectangle only")
+        self.require_either(("generator",), ("file",))
         known = grid.CELLS.get(self.generator or "", tuple(shape.name for shape in SHAPES))
-        self.require(None in (self.cell, self.file), "cell", "cell of generators")
         fits = self.cell is None or self.cell in known
         self.require(fits, "cell", " or ".join(f'"{name}"' for name in known))
-        fits = self.order == 1 or (self.file is None and not self.sides)
-        self.require(fits, "order", "order 2 of other generators than rectangle and box")
-        if self.generator is not None and self.sides:
-            self._check_keys()
-            return self
-        for key in ("origin", "size", "cells", "parts"):
-            self.require(not getattr(self, key), key, f"{key} for a rectangle or box only")
-        fits = self.generator is not None or not self.parameters
-        self.require(fits, "parameters", "parameters of a generator only")
+        others = "generators other than rectangle and box"
+        parametric = self.file is None and not self.sides
+        self.require(parametric or self.order == 1, "order", f"order 2 of {others}")
+        self.require(parametric or not self.parameters, "parameters", f"those of {others}")
+        if self.sides:
+            try:
+                self.check_grid()
+            except grid.GridError as error:
+                raise fault(error.key, error.given, error.accepted) from None
         return self
-
-    def _check_keys(self) -> None:
-        for key in self.parameters:
-            self.require(False, f"parameters.{key}", "parameters of another generator only")
-        for key in ("size", "cells"):
-            accepted = f"a list of {self.dimension} numbers"
-            self.require(getattr(self, key) is not None, key, accepted)
-        try:
-            self.check_grid()
-        except grid.GridError as error:
-            raise fault(error.key, error.given, error.accepted) from None
 
     def check_grid(self) -> None:
         """Raise a GridError if a part of a rectangle or box ends between positions of its grid."""
@@ -249,7 +231,7 @@ class Mesh(Section):
 
     @property
     def _grid(self) -> tuple[Any, Any, Any, Any]:
-        return self.origin, self.size, self.cells, self.pieces
+        return self.origin, self.size, self.cells, self.parts
 
     def build(self, comm: MPI.Intracomm) -> Domain:
         """Make the mesh with its parts. Collective.

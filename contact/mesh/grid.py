@@ -205,10 +205,10 @@ def plan(
         key = f"parts.{name}"
         if name in sides:
             raise GridError(key, name, "a name that no side has")
-        if isinstance(pieces, Piece):
-            patches[name] = [_patch(key, pieces, grid, sides)]
-        else:
+        if isinstance(pieces, Sequence):
             patches[name] = [_patch(f"{key}.{i}", p, grid, sides) for i, p in enumerate(pieces)]
+        else:
+            patches[name] = [_patch(key, pieces, grid, sides)]
     return grid, patches
 
 

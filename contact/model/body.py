@@ -322,9 +322,7 @@ class Bolt(Described):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if (self.force is None) == (self.shortening is None):
-            given = "neither" if self.force is None else "both"
-            raise fault("force", Words(given), "one of force and shortening", "bolt")
+        self.require_either(("force",), ("shortening",), "bolt")
         return self
 
     @property

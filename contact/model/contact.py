@@ -32,7 +32,7 @@ from contact.settings import (
     Words,
     fault,
 )
-from contact.typing import Array
+from contact.typing import Array, TableValue
 from forms.laws import Compliance, PotentialFactor
 
 #: A table, by the name of its shape, or an object with `measure`.
@@ -97,9 +97,8 @@ class Contact(Described):
     """Contact direction on a rigid shape: normal of the foundation or of the body, or along
     `axis`, as the closed forms of indentation take it; cones and edges need that. With a gap it
     is the body's."""
-    axis: Direction | None = None
-    """With `direction = "axis"`: that direction, from the body towards the foundation, of any
-    length."""
+    axis: Annotated[Direction | None, ReadWith("direction", "axis", required=True)] = None
+    """That direction, from the body towards the foundation, of any length."""
     overlap: Literal["refuse", "press"] = "refuse"
     """Meshes of two bodies that overlap in the reference configuration, or a shape that cuts the
     body: `refuse` that, or `press` it out as an interference."""
@@ -151,16 +150,8 @@ class Contact(Described):
         name: str | None = None,
         *,
         electric: Electric | Conductor | None = None,
-        rigid: Motion | None = None,
         law: Literal["signorini", "compliance"] | None = None,
-        direction: Literal["foundation", "body", "axis"] = "foundation",
-        axis: Sequence[float] | Array | None = None,
-        overlap: Literal["refuse", "press"] = "refuse",
-        stiffness: float = 10.0,
-        limit: float = 0.1,
-        potential_factor: float = 2.0,
-        potential_range: float = 128.0,
-        lagged: bool = False,
+        **keys: TableValue | Array | Motion | None,
     ) -> None:
         expect("Contact: press", press, "True or False", isinstance(press, bool | np.bool_))
         fits = isinstance(layer, Layer | float | int | None)
@@ -172,26 +163,13 @@ class Contact(Described):
             gap, foundation = one_of("Contact", foundation=foundation, gap=gap), None
         if isinstance(gap, float) and np.isinf(gap):  # which is no value of a field
             gap, foundation = None, GapFunction.of(gap)
-        super().__init__(
-            on=on,
-            name=name,
-            law=law or ("signorini" if layer is None else "compliance"),
-            against=against,
-            gap=gap,
-            foundation=foundation,
-            direction=direction,
-            axis=axis,
-            overlap="press" if press else overlap,
-            rigid=rigid,
-            layer=0.0 if layer is None else layer,
-            stiffness=stiffness,
-            limit=limit,
-            potential_factor=potential_factor,
-            potential_range=potential_range,
-            lagged=lagged,
-            friction=friction,
-            electric=electric,
-        )
+        given: dict[str, Any] = {**keys, "law": law or "signorini"}
+        if layer is not None:
+            given |= {"law": law or "compliance", "layer": layer}
+        if press:
+            given["overlap"] = "press"
+        given |= {"foundation": foundation, "gap": gap, "friction": friction, "electric": electric}
+        super().__init__(on=on, against=against, name=name, **given)
 
     @model_validator(mode="before")
     @classmethod
@@ -211,8 +189,6 @@ class Contact(Described):
                 raise fault(key, Words(f"both {one} and {other}"), "one of them", "exclusive-keys")
         fits = self.against is None or not meet(self.against, self.on)
         self.require(fits, "against", "another part than `on`")
-        fits = (self.axis is not None) == (self.direction == "axis")
-        self.require(fits, "axis", 'a vector with direction = "axis", and with that alone')
         fits = self.direction == "foundation" or isinstance(shape, Shape | None)
         self.require(fits, "direction", "that of a Shape; others have their own")
         fits = self.foundation is not None or self.axis is None

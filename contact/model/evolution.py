@@ -16,7 +16,7 @@ from contact.arguments import expect
 from contact.errors import InputError
 from contact.model.data import read_data
 from contact.model.section import Described, File, Text, as_tuple
-from contact.settings import Accepted, Count, Fault, Number, Words, fault
+from contact.settings import Accepted, Count, Fault, Number, fault
 from contact.typing import Array
 
 #: Share of an amplitude's range from which on an extreme value that no step meets is told.
@@ -61,20 +61,13 @@ class Amplitude(Described):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.file is not None:
-            for key in ("time", "value"):
-                if getattr(self, key) is not None:
-                    raise fault(key, Words("given with file"), f"{key}, or file", "exclusive-keys")
-            try:
-                _ = self.points  # read now, so that messages name the key
-            except InputError as error:
-                raise Fault(f"file: {error.words}", error.identifier) from None
-            return self
-        for key in ("time", "value"):
-            accepted = f"{key}, or file with times and values"
-            self.require(getattr(self, key) is not None, key, accepted)
-        count = len(self.points[0])
-        self.require(len(self.points[1]) == count, "value", f"{count} values, as many as times")
+        self.require_either(("time", "value"), ("file",))
+        try:
+            times, values = self.points  # read now, so that messages name the key
+        except InputError as error:
+            raise Fault(f"file: {error.words}", error.identifier) from None
+        fits = len(values) == len(times)
+        self.require(fits, "value", f"{len(times)} values, as many as times")
         return self
 
     def __call__(self, time: float) -> float:

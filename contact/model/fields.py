@@ -136,24 +136,7 @@ ACCEPTED = (
 
 
 def field(value: Scalar) -> Field | Moving:
-    """Return a given function of position as a `Field` or `Moving`.
-
-    Parameters
-    ----------
-    value
-        A number, a formula of x, y, z and t as in a case file (``"-10*x"``), a function of x as
-        dolfinx interpolates it, a scalar `ufl.core.expr.Expr` or `dolfinx.fem.Function`, or an
-        object that is a `Field` or `Moving`.
-
-    Returns
-    -------
-    The value as an object that is evaluated at points and in forms.
-
-    Raises
-    ------
-    InputError
-        If it is nothing of the kind.
-    """
+    """Return a given function of position as a `Field` or `Moving`; InputError if it is none."""
     if isinstance(value, Moving):
         return value
     if isinstance(value, np.ndarray) and value.shape == ():

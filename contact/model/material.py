@@ -10,14 +10,13 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 import numpy as np
 from dolfinx.fem import Function
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import Field, Tag, model_validator
 
 from contact.arguments import CONSTANTS as NUMBERS
 from contact.arguments import expect, is_law, several
 from contact.errors import InputError, shown
 from contact.library.materials import PACKAGED, Entry, find
 from contact.model import fields
-from contact.model.messages import describe
 from contact.model.section import (
     Axis,
     Described,
@@ -28,6 +27,7 @@ from contact.model.section import (
     StaticValue,
     Text,
     as_tuple,
+    by_kind,
 )
 from contact.model.units import SystemOfUnits, UnitSystem, named
 from contact.settings import (
@@ -72,20 +72,6 @@ def matrix(rows: int, columns: int) -> Any:
     return several(row, rows, f"a list of {rows} rows of {columns} numbers")
 
 
-def either_way(section: Section, short: tuple[str, ...], full: tuple[str, ...]) -> None:
-    """Raise a fault unless all of some keys, or all of others, are given."""
-    given = [key for key in (*short, *full) if getattr(section, key) is not None]
-    if set(given) in ({*short}, {*full}):
-        return
-    missing = [k for k in (full if {*given} & {*full} else short) if k not in given]
-    raise fault(
-        missing[0] if missing else given[-1],
-        Words(f"only {', '.join(given) or 'nothing'}" if missing else "both ways"),
-        f"either all of {', '.join(short)}, or {' and '.join(full)}",
-        "exclusive-keys",
-    )
-
-
 class Piezo(Section):
     """`[material.piezo]`: the law sigma = F eps + e^T grad(phi), D = e eps - beta grad(phi).
 
@@ -121,7 +107,7 @@ class Piezo(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        either_way(self, PIEZO, ("e", "beta"))
+        self.require_either(PIEZO, ("e", "beta"))
         try:
             from_voigt(*self.voigt)
         except ValueError as error:
@@ -157,18 +143,10 @@ class BackStress(Section):
 
 #: The hardening of `j2`.
 Hardening: TypeAlias = Annotated[
-    Annotated[NonNegative, Tag(":number")]
+    Annotated[NonNegative, Tag(":one")]
     | Annotated[Saturation, Tag(":table")]
-    | Annotated[tuple[Annotated[tuple[Number, Number], as_tuple], ...], as_tuple, Tag(":points")],
-    Discriminator(
-        lambda given: (
-            ":points"
-            if isinstance(given, list | tuple | np.ndarray)
-            else ":table"
-            if isinstance(given, Mapping | Section)
-            else ":number"
-        )
-    ),
+    | Annotated[tuple[Annotated[tuple[Number, Number], as_tuple], ...], as_tuple, Tag(":many")],
+    by_kind,
     Accepted(
         "a modulus >= 0, a table { saturation, rate, modulus }, or a list of points "
         "[plastic strain, stress]"
@@ -281,32 +259,9 @@ class Material(Described):
         piezo: PiezoTensors | Mapping[str, float | Array | Sequence[Sequence[float]]] | None = None,
         on: str | Sequence[str] = (),
         factor: fields.Static | None = None,
-        *,
-        name: str | None = None,
-        units: str | Mapping[str, str] | None = None,
-        library: str | None = None,
-        young: float | None = None,
-        poisson: float | None = None,
-        stiffness: Array | Sequence[Sequence[float]] | None = None,
-        c11: float | None = None,
-        c12: float | None = None,
-        c13: float | None = None,
-        c33: float | None = None,
-        c44: float | None = None,
-        poling: float | Array | Sequence[float] | None = None,
-        yield_strain: float | None = None,
-        argument: Literal["norm", "square"] = "norm",
-        g_min: float = 0.0,
-        yield_stress: float | None = None,
-        hardening: float | Mapping[str, float] | Sequence[Sequence[float]] | None = None,
-        kinematic: float | Sequence[Mapping[str, float]] | None = None,
+        **keys: TableValue | Array | None,
     ) -> None:
-        every: dict[str, Any] = {"name": name, "units": units, "library": library, "young": young}
-        every |= {"poisson": poisson, "stiffness": stiffness, "poling": poling}
-        every |= {"c11": c11, "c12": c12, "c13": c13, "c33": c33, "c44": c44}
-        every |= {"yield_strain": yield_strain, "argument": argument, "g_min": g_min}
-        every |= {"yield_stress": yield_stress, "hardening": hardening, "kinematic": kinematic}
-        keys = {key: value for key, value in every.items() if value is not None}
+        keys = {key: value for key, value in keys.items() if value is not None}
         fits = isinstance(law, str) or is_law(law)
         by_keys = law is None and {*keys} & {"name", "young", "poisson", "stiffness", "c11"}
         expect("law", law, OWN_LAW, fits or by_keys)
@@ -433,7 +388,7 @@ class Material(Described):
 
     def _check_stiffness(self) -> None:
         self.require(self.yield_strain is None, "yield_strain", "yield_strain with another law")
-        either_way(self, SHORT, ("stiffness",))
+        self.require_either(SHORT, ("stiffness",))
         try:
             Anisotropic(self.voigt).check()
         except ValueError as error:
@@ -463,14 +418,9 @@ class Material(Described):
         return isinstance(self.kind, PlaneStressElastic | PlaneStressHistory)
 
     def plane_stress(self) -> Material:
-        """Return the material of a plane body without stress across it, of unit thickness.
-
-        Raises
-        ------
-        InputError
-            If a nonlinear law is piezoelectric: the strain across would have to follow the field.
-        """
+        """Return the material of a plane body without stress across it, of unit thickness."""
         own = self.in_body(2)
+        # With a nonlinear law the strain across would have to follow the electric field.
         fits = own.piezo is None or own.in_plane_stress or is_linear(own.law)
         accepted = "None in plane stress, unless the law is linear"
         expect("piezo", own.piezo, accepted, fits, "plane-stress")
@@ -566,7 +516,4 @@ def make_material(dim: int, **keys: TableValue | Array) -> Material:
     >>> make_material(2, young=210e3, poisson=0.3).law
     Linear(young=210000.0, poisson=0.3)
     """
-    try:
-        return Material.model_validate(keys).in_body(dim)
-    except ValidationError as error:
-        raise describe(error, "make_material") from None
+    return Material(**keys).in_body(dim)  # type: ignore[arg-type]

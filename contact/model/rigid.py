@@ -23,7 +23,7 @@ from contact.model.section import (
     Described,
     Either,
     FactorOfTime,
-    FewTimed,
+    Few,
     Free,
     Part,
     Timed,
@@ -42,11 +42,11 @@ GivenFree: TypeAlias = GivenTimed | Literal["free"] | None
 Given: TypeAlias = GivenFree | Sequence[GivenFree] | Array
 
 Components: TypeAlias = Annotated[
-    FewTimed[FreeTimed],
+    Few[FreeTimed],
     Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula in t or "free"'),
 ]
 Forces: TypeAlias = Annotated[
-    FewTimed[Timed], Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D")
+    Few[Timed], Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D")
 ]
 #: Prefix of a formula in degrees that is in radians.
 DEGREES = "pi/180*("
@@ -228,16 +228,9 @@ class Rigid(Motion):
         on: str | Sequence[str],
         motion: Motion | None = None,
         foundation: bool = False,
-        *,
-        displacement: Sequence[GivenFree] | Array = (),
-        rotation: Given = (),
-        force: Sequence[GivenTimed] | Array = (),
-        moment: GivenTimed | Sequence[GivenTimed] | Array = (),
-        centre: Sequence[float] | Array = (),
-        amplitude: GivenAmplitude | None = None,
+        **components: Given | GivenAmplitude,
     ) -> None:
-        if motion is None:
-            motion = Motion(displacement, rotation, force, moment, centre, amplitude)
+        motion = Motion(**components) if motion is None else motion  # type: ignore[arg-type]
         expect("Rigid: motion", motion, "Motion(...)", isinstance(motion, Motion))
         Described.__init__(self, on=on, foundation=foundation, **dict(motion))
 

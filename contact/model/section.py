@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import field, fields
 from functools import cache, partial, reduce, wraps
 from pathlib import Path
@@ -68,7 +68,7 @@ from contact.model.fields import (
 from contact.model.fields import field as given_field
 from contact.model.formula import Expression
 from contact.model.messages import accepted_by, describe, keys_of, table_fields, unknown
-from contact.settings import MISSING, Accepted, Number, OrOwn, ReadWith, fault
+from contact.settings import MISSING, Accepted, Number, OrOwn, ReadWith, Words, fault
 from contact.typing import Array
 
 Kind = TypeVar("Kind")
@@ -108,7 +108,8 @@ class Section(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _read_keys(cls, given: Any, info: ValidationInfo) -> Any:
-        return given if info.context == IN_PYTHON else with_known_keys(cls, given)
+        own = {key for key, field in cls.model_fields.items() if field.exclude}
+        return with_known_keys(cls, given, own if info.context == IN_PYTHON else ())
 
     @model_validator(mode="after")
     def _check_conditions(self) -> Self:
@@ -126,6 +127,18 @@ class Section(BaseModel):
         if not fits:
             value = as_given(value_at(self, path))
             raise fault(path, MISSING if value is None else value, accepted, identifier)
+
+    def require_either(
+        self, one: tuple[str, ...], other: tuple[str, ...], identifier: str = "exclusive-keys"
+    ) -> None:
+        """Raise a fault unless all of some keys, or all of others, are given."""
+        given = [key for key in (*one, *other) if getattr(self, key) is not None]
+        if {*given} in ({*one}, {*other}):
+            return
+        missing = [key for key in (other if {*given} & {*other} else one) if key not in given]
+        words = Words(f"given {', '.join(given)}") if given else MISSING
+        accepted = f"{', '.join(one)}, or instead {', '.join(other)}"
+        raise fault(missing[0] if missing else given[-1], words, accepted, identifier)
 
     def __copy__(self) -> Self:
         """Return a copy without cached properties, which those of an update would not be."""
@@ -199,8 +212,9 @@ def _read_table(cls: type, source: Any, handler: Any) -> core_schema.CoreSchema:
 def document(cls: Any) -> None:
     """Enter the keys of a table under "Parameters" in its docstring, in the order of `__init__`."""
     said = {key: field.description or "" for key, field in keys_of(cls).items()}
-    own = [key for key in inspect.signature(cls.__init__).parameters if key in said] or [*said]
-    lines = [line for key in own for line in (key, textwrap.indent(said[key], "    "))]
+    first = [key for key in inspect.signature(cls.__init__).parameters if key in said]
+    keys = dict.fromkeys([*first, *said])
+    lines = [line for key in keys for line in (key, textwrap.indent(said[key], "    "))]
     text, _, examples = inspect.cleandoc(cls.__doc__ or "").partition("\n\nExamples\n")
     parts = [text, "\n".join(["Parameters", "----------", *lines])]
     cls.__doc__ = "\n\n".join([*parts, *([f"Examples\n{examples}"] if examples else [])])
@@ -211,12 +225,12 @@ def called(title: Any, on: Any) -> str:
     return f"{title} on {on!r}" if on else str(title)
 
 
-def with_known_keys(of: Any, given: Any) -> Any:
+def with_known_keys(of: Any, given: Any, internal: Collection[str] = ()) -> Any:
     """Return a table, if it has no unknown key, and all that are required."""
     if isinstance(given, Mapping):
         known = keys_of(of)
         for key in given:
-            if key not in known:
+            if key not in known and key not in internal:
                 raise unknown(key, known, getattr(of, "hints", {}).get(key, ""))
         for key, info in known.items():
             if info.is_required() and key not in given:
@@ -281,11 +295,6 @@ def _placed(given: str, info: ValidationInfo) -> FilePath:
     return FilePath(Path((info.context or {}).get("folder", ".")) / given)
 
 
-def _function_of_points(given: Any) -> Any:
-    """Return a function of points as it is, a number or a formula as an `Expression`."""
-    return given if callable(given) else static(_value(given))
-
-
 def _value(given: Any) -> Field | Moving:
     """Return a given function of position and time; of a case file a number or a formula."""
     plain = given is None or isinstance(given, bool | int | float | str | list | Mapping)
@@ -332,10 +341,16 @@ def _not_negative(expression: Any) -> Any:
     return expression
 
 
-#: Tells a list from a single value.
-one_or_many = Discriminator(
-    lambda given: ":many" if isinstance(given, list | tuple | np.ndarray) else ":one"
-)
+def _kind(given: Any) -> str:
+    """Return the tag of a list, a table or a single value."""
+    if isinstance(given, list | tuple | np.ndarray):
+        return ":many"
+    return ":table" if isinstance(given, Mapping | Section) else ":one"
+
+
+#: Tells these apart.
+by_kind = Discriminator(_kind)
+one_or_many = Discriminator(lambda given: ":many" if _kind(given) == ":many" else ":one")
 
 
 def _components(given: Any) -> Any:
@@ -347,14 +362,6 @@ def _components(given: Any) -> Any:
     return tuple(given) if isinstance(given, list) else given
 
 
-def _in_time(given: Any, info: ValidationInfo) -> Any:
-    """Return the components, functions of time with their names in messages."""
-    given, name = _components(given), f"{_named(info)}: {info.field_name}"
-    if not isinstance(given, tuple):
-        return given
-    return tuple(OfTime(v, f"{name}.{k}") if callable(v) else v for k, v in enumerate(given))
-
-
 as_tuple = BeforeValidator(_components)
 
 
@@ -362,13 +369,12 @@ class Spatial(tuple[One, ...]):
     """A list of one entry a dimension."""
 
 
-#: Components of a vector, in 2-D or 3-D, given as a list; in Python a function of the time too
-#: (`FewTimed`). A list of one or more (`Some`). One value, or a list of another type (`Either`),
-#: or of the same one (`OneOrSome`: [contact] or [[contact]]).
+#: Components of a vector, in 2-D or 3-D, given as a list. A list of one or more (`Some`). One
+#: value, or a list of another type (`Either`), or of the same one (`OneOrSome`: [contact] or
+#: [[contact]]).
 Few: TypeAlias = Annotated[
     tuple[One, ...], Bounds(min_length=2, max_length=3), as_tuple, AfterValidator(Spatial)
 ]
-FewTimed: TypeAlias = Annotated[Few[One], BeforeValidator(_in_time)]
 Some: TypeAlias = Annotated[tuple[One, ...], Bounds(min_length=1), as_tuple]
 Either: TypeAlias = Annotated[
     Annotated[One, Tag(":one")] | Annotated[Many, Tag(":many")], one_or_many
@@ -423,11 +429,6 @@ Axis: TypeAlias = Annotated[
 
 #: Read from a number or a formula, and written as that.
 Given: TypeAlias = Annotated[One, PlainSerializer(as_given), WithJsonSchema(_FORMULA)]
-#: In Python a function of points of shape (n, d) too.
-FormulaOrFunction: TypeAlias = Annotated[
-    Given[Annotated[Expression | Callable[[Array], Array], PlainValidator(_function_of_points)]],
-    Accepted("a number or a formula"),
-]
 #: In Python functions, UFL and dolfinx Functions too.
 Value: TypeAlias = Annotated[
     Given[Annotated[Field | Moving, PlainValidator(_value)]], Accepted("a number or a formula")
@@ -440,6 +441,8 @@ StaticValue: TypeAlias = Annotated[
     Given[Annotated[Field, PlainValidator(_value), AfterValidator(static)]],
     Accepted("a number or a formula"),
 ]
+#: In Python a function of points of shape (n, d) too.
+FormulaOrFunction: TypeAlias = Annotated[StaticValue | Callable[[Array], Array], OrOwn(callable)]
 NonNegativeValue: TypeAlias = Annotated[
     StaticValue,
     AfterValidator(_not_negative),

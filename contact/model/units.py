@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Self, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 from annotated_types import Predicate
-from pydantic import Discriminator, Tag, WithJsonSchema, model_validator
+from pydantic import Tag, WithJsonSchema
 
 from contact.model.messages import either, shown
-from contact.model.section import Section, Text
+from contact.model.section import Section, by_kind
 from contact.settings import Accepted
 
 #: Prefixes of SI; the first one of a factor makes the names of units that follow.
@@ -18,7 +18,7 @@ PREFIXES = {
     **{"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "u": 1e-6, "n": 1e-9},
     **{"p": 1e-12, "f": 1e-15, "a": 1e-18, "da": 10.0, "d": 0.1, "c": 0.01, "µ": 1e-6, "μ": 1e-6},
 }
-BASES = {"length": "m", "force": "N", "potential": "V"}
+BASES = ("length", "force", "potential")
 
 #: Exponents of the units of length, force and potential in the other ones. They follow from one
 #: energy, force times length or charge times potential.
@@ -85,26 +85,25 @@ NAMES = either(map(shown, SYSTEMS))
 BY_NAME = {"enum": [*SYSTEMS]}
 
 
+def prefixed(base: str) -> Any:
+    """Return the kind of a unit with a prefix of SI."""
+    fits = Predicate(lambda given: given[-1:] == base and given[:-1] in PREFIXES)
+    accepted = f'{base} with a prefix of SI, such as "m{base}" or "k{base}"'
+    return Annotated[str, fits, Accepted(accepted)]
+
+
 class UnitSystem(Section):
     """`[material.units]`: the system of units of a case, by three of its units.
 
     The others follow: stress = force / length^2, charge = force length / potential.
     """
 
-    length: Text = "m"
+    length: prefixed("m") = "m"  # type: ignore[valid-type]
     """Unit of length: m with a prefix of SI."""
-    force: Text = "N"
+    force: prefixed("N") = "N"  # type: ignore[valid-type]
     """Unit of force: N with a prefix."""
-    potential: Text = "V"
+    potential: prefixed("V") = "V"  # type: ignore[valid-type]
     """Unit of potential: V with a prefix."""
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        for key, base in BASES.items():
-            fits = getattr(self, key)[-1:] == base and getattr(self, key)[:-1] in PREFIXES
-            accepted = f'{base} with a prefix of SI, such as "m{base}" or "k{base}"'
-            self.require(fits, key, accepted)
-        return self
 
     def unit(self, quantity: str) -> float:
         """Return the unit of a quantity, in SI."""
@@ -118,8 +117,8 @@ def named(name: str) -> UnitSystem:
 
 
 SystemOfUnits: TypeAlias = Annotated[
-    Annotated[str, Predicate(SYSTEMS.__contains__), WithJsonSchema(BY_NAME), Tag(":name")]
+    Annotated[str, Predicate(SYSTEMS.__contains__), WithJsonSchema(BY_NAME), Tag(":one")]
     | Annotated[UnitSystem, Tag(":table")],
-    Discriminator(lambda given: ":table" if isinstance(given, Mapping | Section) else ":name"),
+    by_kind,
     Accepted(f"{NAMES}, or a table {{ length, force, potential }}"),
 ]

@@ -64,11 +64,3 @@ def test_a_file_has_changed(written, name, said):
         file.write("\n")
     with pytest.raises(InputError, match=rf"{said} .*\[changed-input\]"):
         check_files("here", "then", first, digest(load_case(written)))
-
-
-def test_the_case_has_changed(written):
-    first, other = (
-        to_toml(load_case(written, changes)) for changes in ([], ["fixed.0.displacement=[0, 0, 1]"])
-    )
-    with pytest.raises(InputError, match=r"\[other-case\]"):
-        check_same("here", "results", first, other, "")

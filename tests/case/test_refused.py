@@ -94,32 +94,17 @@ CASE = {
     "material": {"young": 1.0, "poisson": 0.3},
     "fixed": [{"on": "top", "displacement": [0.0, 0.0, 0.0]}],
 }
+PLANE = {"shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}
+CONE = {"shape": "cone", "apex": [0, 0, 0], "axis": [0, 0, 1], "half_angle": 70.0}
+PUNCH = {"shape": "punch", "centre": [0, 0, 0], "axis": [0, 0, 1], "radius": 1.0}
 BAD_SHAPES = {
-    "key of another shape": (
-        {"shape": "cone", "apex": [0, 0, 0], "axis": [0, 0, 1], "half_angle": 70.0, "inside": True},
-        {},
-    ),
-    "edge": (
-        {
-            "shape": "punch",
-            "centre": [0, 0, 0],
-            "axis": [0, 0, 1],
-            "radius": 1.0,
-            "edge_radius": 2.0,
-        },
-        {},
-    ),
-    "no axis": ({"shape": "punch", "centre": [0, 0, 0], "axis": [0, 0, 0], "radius": 1.0}, {}),
-    "two and three": ({"shape": "cone", "apex": [0, 0, 0], "axis": [0, 1], "half_angle": 70.0}, {}),
-    "angle": ({"shape": "cone", "apex": [0, 0, 0], "axis": [0, 0, 1], "half_angle": 90.0}, {}),
-    "axis missing": (
-        {"shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]},
-        {"direction": "axis"},
-    ),
-    "axis alone": (
-        {"shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]},
-        {"axis": [0, 0, 1]},
-    ),
+    "key of another shape": ({**CONE, "inside": True}, {}),
+    "edge": ({**PUNCH, "edge_radius": 2.0}, {}),
+    "no axis": ({**PUNCH, "axis": [0, 0, 0]}, {}),
+    "two and three": ({**CONE, "axis": [0, 1]}, {}),
+    "angle": ({**CONE, "half_angle": 90.0}, {}),
+    "axis missing": (PLANE, {"direction": "axis"}),
+    "axis alone": (PLANE, {"axis": [0, 0, 1]}),
     "no file": ({"shape": "surface"}, {}),
     "shape": ({"shape": "ball"}, {}),
     "class of a shape": ({"shape": "level"}, {}),

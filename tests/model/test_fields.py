@@ -133,9 +133,6 @@ def test_vectors() -> None:
             Load("top", traction=given)
 
 
-TOP = Fixed("top", [0.0, -0.01])
-
-
 def test_a_function_of_another_mesh() -> None:
     elsewhere = dmesh.create_rectangle(MPI.COMM_SELF, [[5, 5], [6, 6]], [1, 1])
     function = fem.Function(fem.functionspace(elsewhere, ("Lagrange", 1)))

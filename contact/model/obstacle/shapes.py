@@ -82,22 +82,11 @@ class Shape(ABC):
     vectors: ClassVar[tuple[str, ...]] = ("point", "centre", "apex", "normal", "axis")
     only: ClassVar[int | None] = None
 
-    def __post_init__(self) -> None:
-        """Refuse a direction that is not known."""
-        directions = ("foundation", "body", "axis")
-        accepted = ", ".join(f'"{direction}"' for direction in directions)
-        name = f"{type(self).__name__}: direction"
-        expect(name, self.direction, accepted, self.direction in directions)
-
     def check(self, dim: int) -> None:
-        """Refuse a shape of another dimension than space, and directions without length.
-
-        Raises
-        ------
-        InputError
-            If it is one.
-        """
+        """Refuse unknown directions, those without length, and another dimension than space."""
         name = type(self).__name__
+        known = self.direction in ("foundation", "body", "axis")
+        expect(f"{name}: direction", self.direction, '"foundation", "body", "axis"', known)
         expect(f"{name}: dimension", dim, f"{self.only}", self.only in (None, dim))
         along = ("along",) if self.direction == "axis" else ()
         for key in (*(key for key in self.vectors if hasattr(self, key)), *along):
@@ -116,12 +105,7 @@ class Shape(ABC):
         """Refuse normals against the slope of the distance, its difference quotient.
 
         It is taken at some of the points from which the shape is seen, shape (n, d); at single ones
-        it may be off, at edges or where the distance is an approximation.
-
-        Raises
-        ------
-        InputError
-            If normals point against it at most of the points.
+        it may be off, at edges or where the distance is an approximation: most of them decide.
         """
         x = points[:: len(points) // CHECKED + 1]
         distance, normal = self.distance(x)
@@ -446,7 +430,6 @@ class Punch(AboutAxis):
 
     def __post_init__(self) -> None:
         """Refuse an edge that is rounder than the punch."""
-        super().__post_init__()
         if self.edge_radius > self.radius:
             raise fault(
                 "edge_radius", self.edge_radius, f"a number from 0 to radius = {self.radius:g}"

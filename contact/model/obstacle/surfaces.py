@@ -59,7 +59,6 @@ class Heights(Shape):
 
     def __post_init__(self) -> None:
         """Refuse heights that are given in no way, or in two; and those that are no grid."""
-        super().__post_init__()
         if one_of("Heights", heights=self.heights, file=self.file) is None:
             raise fault("file", MISSING, "a file, or in Python places and heights")
         for key in ("spacing", "origin"):
@@ -198,7 +197,6 @@ class Triangles(Shape):
 
     def __post_init__(self) -> None:
         """Refuse a surface that is given in no way, or in two."""
-        super().__post_init__()
         if one_of("Triangles", corners=self.corners, file=self.file) is None:
             raise fault("file", MISSING, "an STL file, or in Python corners")
 
