@@ -60,6 +60,16 @@ def test_ranks_of_mpich_that_wait_give_way(launcher):
     assert launcher.run(*words, **{count: "9"})[1] == "1 9 1\n"
 
 
+@pytest.mark.parametrize(("text", "display"), [("exit 1", ""), ("echo 42 >&3", ":42")])
+def test_a_root_without_a_display_gets_one_if_it_starts(launcher, text, display):
+    (launcher.fakes / "marker7").write_text("trixie\n")
+    launcher.fake("setsid", 'exec "$@"')
+    launcher.fake("setpriv", 'exec "${@:3}"')
+    launcher.fake("Xvfb", text)
+    words = ["sh", "-c", 'echo "$DISPLAY"; exit 7']
+    assert launcher.run(*words, DISPLAY="", INSIDE="7") == (7, f"{display}\n", "")
+
+
 @pytest.mark.parametrize(
     ("version", "scalar", "reason"),
     [
