@@ -96,8 +96,7 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
 def parser() -> tuple[Parser, dict[str, Parser]]:
     """Return the parser of all commands, and that of each by its name."""
     whole = Parser(prog="contact", description=DESCRIPTION, epilog=EXIT)
-    names = "demo|new|mesh|check|solve|sweep|plot|view|identify|materials|schema"
-    commands = whole.add_subparsers(dest="command", required=True, metavar=names)
+    commands = whole.add_subparsers(dest="command", required=True)
     version = f"contact {__version__}"
     whole.add_argument("--help", action="help", help="show this help and leave")
     whole.add_argument("--version", action="version", version=version, help="show the version")
