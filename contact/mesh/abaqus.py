@@ -23,7 +23,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from contact.mesh.cells import joined_facets, single_facets, unique_rows
+from contact.mesh.cells import FACES, joined_facets, single_facets, unique_rows
 from contact.mesh.contents import ELEMENTS, Contents, Ints, Kind, decoded
 from contact.typing import Array
 
@@ -43,23 +43,6 @@ NO_CELLS = re.compile(r"MASS|ROTARYI|SPRIN|DASHPOT|CONN|GAP|DCOUP|USER|U\d")
 #: Beginnings of the names of plane elements, and the kinematics for which they are made.
 KINEMATICS = {"CPS": "plane_stress", "CPE": "plane_strain", "CAX": "axisymmetric"}
 KINEMATICS["CGAX"] = KINEMATICS["CAX"]
-
-#: Corners of the faces S1, S2, ... of elements.
-FACES = {
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
-    "prism": ((0, 1, 2), (3, 5, 4), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    "hexahedron": (
-        (0, 1, 2, 3),
-        (4, 7, 6, 5),
-        (0, 4, 5, 1),
-        (1, 5, 6, 2),
-        (2, 6, 7, 3),
-        (3, 7, 4, 0),
-    ),
-}
 
 #: Either side of a shell, which is a facet of solids as a whole.
 SIDES = {"", "S1", "S2", "SPOS", "SNEG"}

@@ -243,11 +243,14 @@ def barycentric(points: Array) -> Array:
     return np.column_stack([1 - points.sum(axis=1), points])
 
 
-#: Number of corners of a cell in 3-D -> corners around its faces, all in VTK's order.
-FACES: dict[int, tuple[tuple[int, ...], ...]] = {
-    5: ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
-    6: ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    8: (
+#: Corners around the facets of a cell, in VTK's order; Abaqus calls the facets S1, S2, ...
+FACES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "pyramid": ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+    "prism": ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    "hexahedron": (
         *((0, 1, 2, 3), (4, 5, 6, 7)),
         *((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
     ),
@@ -268,10 +271,11 @@ def simplices(rows: Nodes, dim: int) -> Nodes:
     if dim == 2:
         around = np.take_along_axis(rows, (np.arange(4) + smallest[:, None]) % 4, axis=1)
         return around[:, [[0, 1, 2], [0, 2, 3]]]
-    made = np.empty((len(rows), {5: 2, 6: 3, 8: 6}[count], 4), dtype=rows.dtype)
+    name, pieces = {5: ("pyramid", 2), 6: ("prism", 3), 8: ("hexahedron", 6)}[count]
+    made = np.empty((len(rows), pieces, 4), dtype=rows.dtype)
     for tip in range(count):
         mine = smallest == tip
-        faces = [rows[mine][:, list(face)] for face in FACES[count] if tip not in face]
+        faces = [rows[mine][:, list(face)] for face in FACES[name] if tip not in face]
         made[mine, :, :3] = np.concatenate([simplices(face, 2) for face in faces], axis=1)
         made[mine, :, 3] = rows[mine, tip, None]
     return made

@@ -70,6 +70,12 @@ class Kind:
         found = NAMES.get(stem, stem)
         return Kind(found if found in ELEMENTS else name, nodes)
 
+    @staticmethod
+    def named(name: str) -> Kind:
+        """Return the type of a name of meshio, whose digits are its nodes if it is not straight."""
+        stem = name.rstrip("0123456789")
+        return Kind.of(name, int(name[len(stem) :] or ELEMENTS[NAMES.get(stem, stem)][1]))
+
     def __str__(self) -> str:
         """Return its name and number of nodes, as Gmsh writes them."""
         return f"{self.name.capitalize()} {self.nodes}" if self.name in ELEMENTS else self.name

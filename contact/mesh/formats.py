@@ -28,8 +28,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from contact.errors import InputError
-from contact.mesh.cells import joined_facets
-from contact.mesh.contents import Contents, Ints, decoded
+from contact.mesh.cells import FACES, joined_facets
+from contact.mesh.contents import Contents, Ints, Kind, decoded
 
 
 @contextmanager
@@ -187,41 +187,29 @@ def _med_groups(given: Any, names: dict[int, list[str]]) -> dict[str, Ints]:
     return found
 
 
-#: Beginnings of the names of elements, and meshio's names without a number; "" for points.
-EXODUS_KINDS = {
-    "SPHERE": "",
-    "BEAM": "line",
-    "BAR": "line",
-    "TRUSS": "line",
-    "EDGE": "line",
-    "TRI": "triangle",
-    "QUAD": "quad",
-    "SHELL": "quad",
-    "TET": "tetra",
-    "PYR": "pyramid",
-    "WEDGE": "wedge",
-    "HEX": "hexahedron",
+#: Beginnings of the names of elements in Exodus, and of topologies in XDMF.
+KINDS = {
+    **dict.fromkeys(("SPHERE", "POLYVERTEX"), "vertex"),
+    **dict.fromkeys(("BEAM", "BAR", "TRUSS", "EDGE", "POLYLINE"), "interval"),
+    **{"TRI": "triangle", "QUAD": "quadrilateral", "SHELL": "quadrilateral"},
+    **{"TET": "tetrahedron", "PYR": "pyramid", "WEDGE": "prism", "HEX": "hexahedron"},
 }
 
-#: Corners of the sides of elements, by meshio's names without a number.
+#: The sides 1, 2, ... of elements in Exodus among the `FACES` of cells in 3-D.
 EXODUS_SIDES = {
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetra": ((0, 1, 3), (1, 2, 3), (0, 3, 2), (0, 2, 1)),
-    "pyramid": ((0, 1, 4), (1, 2, 4), (2, 3, 4), (0, 4, 3), (0, 3, 2, 1)),
-    "wedge": ((0, 1, 4, 3), (1, 2, 5, 4), (0, 3, 5, 2), (0, 2, 1), (3, 4, 5)),
-    "hexahedron": (
-        (0, 1, 5, 4),
-        (1, 2, 6, 5),
-        (2, 3, 7, 6),
-        (0, 4, 7, 3),
-        (0, 3, 2, 1),
-        (4, 5, 6, 7),
-    ),
+    "tetrahedron": (1, 2, 3, 0),
+    "pyramid": (1, 2, 3, 4, 0),
+    "prism": (2, 3, 4, 0, 1),
+    "hexahedron": (2, 3, 4, 5, 0, 1),
 }
 
-#: The first two sides of shells in 3-D, the whole cell; the others are edges, no facets of solids.
-EXODUS_SHELLS = {"triangle": ((0, 1, 2), (0, 2, 1)), "quad": ((0, 1, 2, 3), (0, 3, 2, 1))}
+
+def _kind(given: str) -> str:
+    """Return the name of the cells that a program calls by a name."""
+    for begins, name in KINDS.items():
+        if given.upper().startswith(begins):
+            return name
+    raise ValueError(f"elements {given!r} that are not known")
 
 
 def read_exodus(file: Path) -> Contents:
@@ -253,11 +241,7 @@ def _add_exodus_blocks(data: Any, made: Contents) -> None:
             continue
         given = data.variables[f"connect{number + 1}"]
         rows = np.asarray(given[:], dtype=np.int64) - 1
-        kind = str(given.elem_type).upper()
-        known = [own for begins, own in EXODUS_KINDS.items() if kind.startswith(begins)]
-        if not known:
-            raise ValueError(f"elements {kind} that are not known")
-        blocks.append((known[0] or "vertex", rows))
+        blocks.append((_kind(str(given.elem_type)), rows))
         made.groups.setdefault(name, {})[number] = np.arange(len(rows), dtype=np.int64)
     made.blocks = blocks
 
@@ -297,12 +281,14 @@ def _exodus_names(data: Any, kind: str, count: int) -> list[str]:
 def _side_facets(contents: Contents, elements: Ints, sides: Ints) -> Ints:
     """Return the sides of elements by their corners."""
     found: list[Ints] = []
-    tables, first = EXODUS_SIDES, 0
-    if {name for name, _ in contents.blocks} & {"tetra", "pyramid", "wedge", "hexahedron"}:
-        tables = EXODUS_SIDES | EXODUS_SHELLS
+    solid, first = any(name in EXODUS_SIDES for name, _ in contents.blocks), 0
     for name, nodes in contents.blocks:
         here = (elements >= first) & (elements < first + len(nodes))
-        table = tables.get(name, ())
+        faces = FACES.get(name, ())
+        table = [faces[k] for k in EXODUS_SIDES.get(name, range(len(faces)))]
+        if solid and name in ("triangle", "quadrilateral"):
+            # Either side of a shell is the whole cell; its edges are no facets of solids.
+            table = [tuple(range(len(faces)))] * 2
         for side in np.unique(sides[here]):
             if side < len(table):
                 rows = nodes[elements[here & (sides == side)] - first]
@@ -310,44 +296,6 @@ def _side_facets(contents: Contents, elements: Ints, sides: Ints) -> Ints:
         first += len(nodes)
     return joined_facets(found)
 
-
-#: First words of the names of topologies, and names of cells.
-XDMF_KINDS = {
-    "polyvertex": "vertex",
-    "polyline": "interval",
-    "edge": "interval",
-    "triangle": "triangle",
-    "tri": "triangle",
-    "quadrilateral": "quadrilateral",
-    "quad": "quadrilateral",
-    "tetrahedron": "tetrahedron",
-    "tet": "tetrahedron",
-    "pyramid": "pyramid",
-    "wedge": "prism",
-    "hexahedron": "hexahedron",
-    "hex": "hexahedron",
-}
-
-#: Cells of mixed topologies by their number: names, and numbers of nodes.
-MIXED = {
-    1: ("vertex", 1),
-    2: ("interval", 2),
-    4: ("triangle", 3),
-    5: ("quadrilateral", 4),
-    6: ("tetrahedron", 4),
-    7: ("pyramid", 5),
-    8: ("prism", 6),
-    9: ("hexahedron", 8),
-    34: ("interval", 3),
-    35: ("quadrilateral", 9),
-    36: ("triangle", 6),
-    37: ("quadrilateral", 8),
-    38: ("tetrahedron", 10),
-    39: ("pyramid", 13),
-    40: ("prism", 15),
-    48: ("hexahedron", 20),
-    50: ("hexahedron", 27),
-}
 
 #: Cells of mixed topologies whose number of nodes stands before these.
 COUNTED = (1, 2)
@@ -419,21 +367,23 @@ def _xdmf_blocks(grid: Element, root: Element, file: Path) -> list[tuple[str, In
     rows = _xdmf_array(next(topology.iter("DataItem")), root, file).astype(np.int64)
     if given == "Mixed":
         return _xdmf_mixed(rows.ravel())
-    name = XDMF_KINDS.get(given.split("_")[0].lower())
-    if name is None or rows.ndim != 2:
-        raise ValueError(f"a topology {given!r}, which is not known")
-    return [(name, rows)]
+    if rows.ndim != 2:
+        raise ValueError(f"a topology {given!r} without rows of nodes")
+    return [(_kind(given), rows)]
 
 
 def _xdmf_mixed(data: Ints) -> list[tuple[str, Ints]]:
     """Return the cells of a mixed topology, a list of type, nodes, type, nodes, ..."""
-    runs: list[tuple[tuple[str, int], list[Ints]]] = []
+    from meshio.xdmf.common import xdmf_idx_to_meshio_type
+
+    runs: list[tuple[str, list[Ints]]] = []
     at = 0
     while at < len(data):
         number = int(data[at])
-        if number not in MIXED:
+        if number not in xdmf_idx_to_meshio_type:
             raise ValueError(f"cells of number {number} in a mixed topology, which are not known")
-        nodes = MIXED[number][1]
+        name = xdmf_idx_to_meshio_type[number]
+        nodes = Kind.named(name).nodes
         before = 1 + (number in COUNTED)
         width = before + nodes
         ahead = data[at : at + WINDOW * width]
@@ -442,11 +392,11 @@ def _xdmf_mixed(data: Ints) -> list[tuple[str, Ints]]:
         count = len(alike) if alike.all() else int(alike.argmin())
         if not count or (before == 2 and np.any(ahead[:count, 1] != nodes)):
             raise ValueError("a mixed topology that is cut off, or lines of several points")
-        if not runs or runs[-1][0] != MIXED[number]:
-            runs.append((MIXED[number], []))
+        if not runs or runs[-1][0] != name:
+            runs.append((name, []))
         runs[-1][1].append(ahead[:count, before:])
         at += count * width
-    return [(name, np.concatenate(rows)) for (name, _), rows in runs]
+    return [(name, np.concatenate(rows)) for name, rows in runs]
 
 
 def _xdmf_array(item: Element, root: Element, file: Path) -> Any:

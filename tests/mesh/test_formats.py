@@ -17,6 +17,8 @@ from contact.errors import InputError
 from contact.mesh.contents import SERENDIPITY, Contents
 from contact.mesh.formats import session
 from contact.mesh.reader import FORMATS, _by_meshio, from_file, mesh_files
+from contact.ranks import on_root
+from tests.mesh.test_conventions import HEXAHEDRA, cells
 from tests.problems import files
 from tests.problems.sizes import integral, measures
 
@@ -61,13 +63,14 @@ ground, 2
 *END STEP
 """
 
-#: Edges of a hexahedron by their corners, in the order of the middle nodes of C3D20.
-EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)]
-EDGES += [(0, 4), (1, 5), (2, 6), (3, 7)]
 
+def two_cubes(program: str, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points of two cubes along x, and each of them by its nodes in a program's order.
 
-def two_cubes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points of two cubes along x, and each of them by its nodes in a unit cube."""
+    Those of MED are mirrored.
+    """
+    points, rows = cells(3, HEXAHEDRA[program])
+    nodes = points[rows[0, :count]][:, [1, 0, 2] if "MED" in program else [0, 1, 2]]
     every = np.concatenate([nodes, nodes + np.array([1.0, 0.0, 0.0])])
     points, number = np.unique(every, axis=0, return_inverse=True)
     return points, number.reshape(2, -1)
@@ -75,9 +78,7 @@ def two_cubes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def bricks(bend: float = 0.0) -> str:
     """Two elements of twenty nodes, of which one edge may be bent; faces as Abaqus numbers them."""
-    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    corners = np.array([(x, y, z) for z in (0, 1) for x, y in square], float)
-    points, rows = two_cubes(np.concatenate([corners, corners[EDGES].mean(axis=1)]))
+    points, rows = two_cubes("Abaqus 20", 20)
     points[(points == [0.5, 0.0, 0.0]).all(axis=1), 2] = bend
     surfaces = [("low", "Eall, S1"), ("high", "Eall, S2"), ("front", "1, S3"), ("end", "2, S4")]
     surfaces += [("back", "2, S5"), ("start", "1, S6"), ("skin", "Eall,")]
@@ -86,7 +87,10 @@ def bricks(bend: float = 0.0) -> str:
 
 
 def write_other(path, name: str) -> None:
-    """Write the plate with meshio, as far as a format goes."""
+    """Write the plate, with meshio as far as a format goes."""
+    if name == "plate.inp":
+        path.write_text(PLATE)
+        return
     meshio = pytest.importorskip("meshio")
     points = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1.0]])
     quads = ("quad", np.array([[0, 1, 4, 3], [1, 2, 5, 4]]))
@@ -119,28 +123,13 @@ def write_other(path, name: str) -> None:
     meshio.write(path, made, **more)
 
 
-#: Places of nodes of MED's HEXA27 in the unit cube: corners, edges of the lower and the upper face
-#: and between them, the lower face, those around, the upper one, the middle.
-H27 = np.array(
-    [
-        *((0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0), (0, 0, 1), (0, 1, 1), (1, 1, 1), (1, 0, 1)),
-        *((0, 0.5, 0), (0.5, 1, 0), (1, 0.5, 0), (0.5, 0, 0)),
-        *((0, 0.5, 1), (0.5, 1, 1), (1, 0.5, 1), (0.5, 0, 1)),
-        *((0, 0, 0.5), (0, 1, 0.5), (1, 1, 0.5), (1, 0, 0.5)),
-        *((0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 1, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5)),
-        *((0.5, 0.5, 1), (0.5, 0.5, 0.5)),
-    ],
-    dtype=float,
-)
-
-
-#: Nodes of its lower and its upper side: corners, edges between them, the middle.
+#: Nodes of the lower and the upper side of MED's HEXA27: corners, edges between them, the middle.
 LOWER, UPPER = [0, 1, 2, 3, 8, 9, 10, 11, 20], [4, 7, 6, 5, 15, 14, 13, 12, 25]
 
 
 def salome(count: int = 27, bend: float = 0.0) -> Contents:
     """Return two mirrored cubes along x as Salome has them: a side in two groups, one in none."""
-    points, rows = two_cubes(H27[:count])
+    points, rows = two_cubes("MED 27", count)
     points[:, 2] += bend * points[:, 0] * (2 - points[:, 0])
     of_side = {27: 9, 20: 8, 8: 4}[count]
     sides = np.concatenate([rows[:, side[:of_side]] for side in (LOWER, UPPER)])
@@ -168,9 +157,7 @@ def regions(domain) -> dict[str, float]:
 @pytest.mark.parallel
 def test_sets_of_abaqus_are_parts_and_regions(shared_tmp_path):
     path = shared_tmp_path / "plate.inp"
-    if COMM.rank == 0:
-        path.write_text(PLATE)
-    COMM.barrier()
+    on_root(COMM, lambda: path.write_text(PLATE))
     domain = from_file(COMM, path)
     expected = {"top": 2.0, "side": 1.0, "Nall": 6.0, "ground": 2.0, "below": 2.0}
     assert measures(domain) == pytest.approx(expected)
@@ -215,9 +202,7 @@ def test_bent_edges_are_kept(tmp_path):
 @pytest.mark.parametrize("name", FILES)
 def test_other_formats(name, shared_tmp_path):
     parts, cells = FILES[name]
-    if COMM.rank == 0:
-        write_other(shared_tmp_path / name, name)
-    COMM.barrier()
+    on_root(COMM, lambda: write_other(shared_tmp_path / name, name))
     domain = from_file(COMM, shared_tmp_path / name)
     assert measures(domain) == pytest.approx(parts)
     assert regions(domain) == pytest.approx(cells)
@@ -265,9 +250,7 @@ def test_the_case_file_names_every_ending():
 def test_groups_of_salome(count, shared_tmp_path):
     """Families of several groups, arrays that are left out, nodes in MED's own order."""
     path = shared_tmp_path / "piece.med"
-    if COMM.rank == 0:
-        files.write(path, salome(count, 0.0 if count == 8 else 0.05))
-    COMM.barrier()
+    on_root(COMM, lambda: files.write(path, salome(count, 0.0 if count == 8 else 0.05)))
     domain = from_file(COMM, path)
     bent = 1.0 if count == 8 else measures(domain)["high"]
     expected = {"low": 2 * bent, "Group_of_faces": 2 * bent, "high": bent, "left": 1.0}
@@ -323,10 +306,7 @@ def test_side_sets_of_exodus(tmp_path):
 @pytest.mark.parametrize("name", ["plate.inp", *FILES])
 def test_contact_new_takes_each_of_them(name, tmp_path, capsys):
     path = tmp_path / name
-    if name == "plate.inp":
-        path.write_text(PLATE)
-    else:
-        write_other(path, name)
+    write_other(path, name)
     capsys.readouterr()
     assert main(["new", str(path)]) == CONVERGED
     assert main(["check", str(path.with_suffix(".toml"))]) == CONVERGED

@@ -12,6 +12,7 @@ import meshes
 from contact.mesh.cells import FACES
 from contact.mesh.contents import Cells, Contents, Groups, check
 from contact.mesh.reader import from_file
+from contact.ranks import on_root
 from tests.problems import files
 from tests.problems.sizes import integral, measures
 
@@ -32,7 +33,7 @@ def stack() -> Contents:
 
     a, b, c = cube(0), cube(1), cube(2)
     prisms = [b[[0, 1, 4, 3, 2, 7]], b[[1, 5, 4, 2, 6, 7]]]
-    pyramids = [[*c[list(face)], 16] for face in FACES[8]]
+    pyramids = [[*c[list(face)], 16] for face in FACES["hexahedron"]]
     low = [b[0], b[1], b[4]]
     blocks = {"hexahedron": [a], "wedge": prisms, "pyramid": pyramids, "tetra": [[*low, 17]]}
     made = Contents(np.array(points), [(name, np.array(rows)) for name, rows in blocks.items()])
@@ -131,9 +132,7 @@ def write(path, contents: Contents) -> None:
 @pytest.mark.parametrize("name", ["stack.inp", "stack.msh", "stack.vtu"])
 def test_files_of_unlike_cells_keep_their_sets(name, shared_tmp_path):
     path = shared_tmp_path / name
-    if COMM.rank == 0:
-        write(path, stack())
-    COMM.barrier()
+    on_root(COMM, lambda: write(path, stack()))
     domain = from_file(COMM, path)
     found = {region: integral(domain, region=region) for region in VOLUMES}
     assert found == pytest.approx(VOLUMES)
