@@ -14,6 +14,7 @@ from contact.case.file import to_toml
 from contact.cli.main import main
 from contact.errors import InputError
 from contact.io.folder import LOCK, STAGE, ResultFolder, result_folder, settle
+from contact.ranks import on_root
 from tests.problems.processes import CLONE
 from tests.problems.written import block
 from tests.results.test_steps import case_of as steps_case
@@ -134,14 +135,6 @@ def test_one_run_at_a_time(tmp_path: Path) -> None:
 
 def on_the_line(*arguments: object) -> int:
     return main([str(argument) for argument in (*arguments, "--quiet")])
-
-
-def on_root(comm: MPI.Intracomm, action: Callable[[], object]) -> None:
-    """Do something on rank 0 while the others wait."""
-    comm.barrier()
-    if comm.rank == 0:
-        action()
-    comm.barrier()
 
 
 @pytest.fixture

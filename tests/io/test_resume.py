@@ -3,6 +3,8 @@
 import json
 import shutil
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -25,22 +27,19 @@ class Killed(BaseException):
     """What ends a run here."""
 
 
-@pytest.fixture
-def ended(monkeypatch):
-    """Return a function that lets a run end after some of its steps."""
+@contextmanager
+def ended(count: int) -> Iterator[None]:
+    """Let a run end after some of its steps."""
+    keep = Checkpoints.keep
 
-    def after(count):
-        keep = Checkpoints.keep
+    def last(self, record):
+        keep(self, record)
+        if self._count == count:
+            raise Killed
 
-        def last(self, record):
-            keep(self, record)
-            if self._count == count:
-                raise Killed
-
-        monkeypatch.setattr(Checkpoints, "keep", last)
-        return lambda: monkeypatch.setattr(Checkpoints, "keep", keep)
-
-    return after
+    with pytest.MonkeyPatch.context() as patched, pytest.raises(Killed):
+        patched.setattr(Checkpoints, "keep", last)
+        yield
 
 
 def hencky(**changes):
@@ -51,13 +50,11 @@ def hencky(**changes):
 @pytest.mark.core
 @pytest.mark.parametrize("elsewhere", [False, True])
 @pytest.mark.parametrize("count", [1, 3])
-def test_going_on(tmp_path, ended, count, elsewhere):
+def test_going_on(tmp_path, count, elsewhere):
     case = hencky()
     whole = solve(case, comm=SELF)
-    heal = ended(count)
-    with pytest.raises(Killed):
+    with ended(count):
         solve_and_keep(case, None, SELF, tmp_path)
-    heal()
     out = tmp_path
     if elsewhere:
         out = tmp_path / "elsewhere"
@@ -76,14 +73,12 @@ def test_going_on(tmp_path, ended, count, elsewhere):
 
 @pytest.mark.core
 @pytest.mark.parametrize("count", [1, 4])
-def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, ended, count):
+def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, count):
     """Of press, shear and unload with friction: bit for bit on the same ranks."""
     case = block("chaboche", cells=3)
     whole = solve(case, comm=SELF)
-    heal = ended(count)
-    with pytest.raises(Killed):
+    with ended(count):
         solve_and_keep(case, None, SELF, tmp_path)
-    heal()
     solution = solve_and_keep(case, None, SELF, tmp_path, tmp_path)
     assert solution.converged and len(solution.steps) == len(whole.steps)
     assert whole.plastic_dissipation > 0
@@ -93,7 +88,7 @@ def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, ended, count):
 
 @pytest.mark.core
 @pytest.mark.parallel
-def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
+def test_other_ranks_go_on(shared_tmp_path: Path) -> None:
     """All ranks, one of them alone, and all again in one folder."""
     world, place = MPI.COMM_WORLD, shared_tmp_path / "checkpoints"
     case = block("chaboche", cells=3)
@@ -104,10 +99,8 @@ def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
             if count is None:
                 solution = solve_and_keep(case, None, comm, shared_tmp_path, restart)
             else:
-                heal = ended(count)
-                with pytest.raises(Killed):
+                with ended(count):
                     solve_and_keep(case, None, comm, shared_tmp_path, restart)
-                heal()
         world.barrier()
     assert solution.converged and len(solution.steps) == len(whole.steps) == 6
     assert len(solution.history) < len(whole.history)
@@ -137,15 +130,13 @@ def on_the_line(*arguments):
 
 
 @pytest.mark.core
-def test_the_command_line(tmp_path, ended, capfd):
+def test_the_command_line(tmp_path, capfd):
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(to_toml(steps_case()))
     assert on_the_line("solve", "--restart", out) == 2
     assert f"--restart {out}: no checkpoints there" in capfd.readouterr().err
-    heal = ended(2)
-    with pytest.raises(Killed):
+    with ended(2):
         on_the_line("solve", case, "--out", out)
-    heal()
     other = ("--set", "friction.mu.rho=1.0")
     assert on_the_line("solve", case, "--restart", out, *other) == 2
     words = "given checkpoints of another case: there friction.mu.rho is 10000.0, here 1.0"
@@ -216,15 +207,13 @@ steps = [3]
 """
 
 
-def test_another_mesh_file_is_not_continued(tmp_path, ended, capfd):
+def test_another_mesh_file_is_not_continued(tmp_path, capfd):
     """Of the same nodes."""
     out, case, mesh = tmp_path / "out", tmp_path / "case.toml", tmp_path / "square.msh"
     shutil.copy(MESHES / "square.msh", mesh)
     case.write_text(SQUARE.format(mesh=mesh))
-    heal = ended(1)
-    with pytest.raises(Killed):
+    with ended(1):
         on_the_line("solve", case, "--out", out)
-    heal()
     mesh.write_text(mesh.read_text() + "\n")
     assert on_the_line("solve", "--restart", out) == 2
     words = "the file mesh.file has changed since the checkpoints were written"

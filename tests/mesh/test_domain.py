@@ -6,7 +6,6 @@ Meshes that fall apart: every piece has to be held.
 
 from pathlib import Path
 
-import gmsh
 import numpy as np
 import pytest
 from dolfinx import fem
@@ -16,10 +15,13 @@ from mpi4py import MPI
 from contact import InputError, build_problem, parse_case
 from contact.case.mesh import Mesh as MeshSection
 from contact.mesh.cells import shape_of
+from contact.mesh.contents import Contents
 from contact.mesh.domain import from_mesh
 from contact.mesh.entities import connected_components
 from contact.mesh.grid import Piece, box, rectangle
 from contact.mesh.transfer import refined
+from contact.ranks import on_root
+from tests.problems import files
 from tests.problems.messages import message_of
 from tests.problems.sizes import integral, measures
 
@@ -275,31 +277,25 @@ def test_refinement_keeps_the_parts(kind):
 
 def write_two_squares(path: Path, *, share: bool) -> None:
     """Write two squares side by side, with one edge between them or two on top of each other."""
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        occ, model = gmsh.model.occ, gmsh.model
-        squares = [(2, occ.addRectangle(x, 0, 0, 1, 1)) for x in (0.0, 1.0)]
-        if share:
-            occ.fragment(squares[:1], squares[1:])
-        occ.synchronize()
-        edges = [(tag, occ.getCenterOfMass(1, tag)) for _, tag in model.getEntities(1)]
-        for name, axis, value in (("left", 0, 0.0), ("bottom", 1, 0.0), ("top", 1, 1.0)):
-            tags = [tag for tag, middle in edges if abs(middle[axis] - value) < 1e-9]
-            model.addPhysicalGroup(1, tags, name=name)
-        model.addPhysicalGroup(2, [tag for _, tag in model.getEntities(2)], name="body")
-        model.mesh.setSize(model.getEntities(0), 0.3)
-        model.mesh.generate(2)
-        gmsh.write(str(path))
-    finally:
-        gmsh.finalize()
+    square = np.array([*np.ndindex(5, 5)]) / 4
+    right = np.array([1.0, 0.0])
+    points, number = np.concatenate([square, square + right]), np.arange(25).reshape(5, 5)
+    corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    cells = np.stack(corners, axis=2).reshape(-1, 4)
+    cells = np.concatenate([cells, cells + 25])
+    if share:
+        points, new = np.unique(points, axis=0, return_inverse=True)
+        cells = new.reshape(-1)[cells]
+    x, y = points.T
+    sides = {"left": x == 0, "bottom": y == 0, "top": y == 1}
+    nodes = {name: np.flatnonzero(own) for name, own in sides.items()}
+    flat = np.column_stack([points, np.zeros(len(points))])
+    files.write(path, Contents(flat, [("quad", cells)], nodes=nodes))
 
 
 def squares(folder: Path, *, share: bool, friction: bool = True) -> dict:
-    path = folder / "squares.msh"
-    if COMM.rank == 0:
-        write_two_squares(path, share=share)
-    COMM.Barrier()
+    path = folder / "squares.inp"
+    on_root(COMM, lambda: write_two_squares(path, share=share))
     case = {
         "mesh": {"file": str(path)},
         "material": {"law": "linear", "young": 1.0, "poisson": 0.3},

@@ -8,6 +8,7 @@ from mpi4py import MPI
 from contact import solve
 from contact.cli.main import CONVERGED, main
 from contact.mesh.reader import from_file
+from contact.ranks import on_root
 from tests.mesh.test_formats import PLATE, bricks, regions
 from tests.problems.sizes import integral, measures
 
@@ -60,9 +61,7 @@ SOURCES = {
 def written(folder, name):
     """Write a source, convert it on one rank, and return both names. Collective."""
     source, made = folder / name, folder / "part.xdmf"
-    if COMM.rank == 0:
-        source.write_text(SOURCES[name])
-    COMM.barrier()
+    on_root(COMM, lambda: source.write_text(SOURCES[name]))
     assert main(["mesh", str(source), str(made)]) == CONVERGED
     COMM.barrier()
     return source, made

@@ -40,6 +40,7 @@ from scripts.studies.effectivity import known
 from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import Singular, manufactured
 from tests.problems.bar import changed
+from tests.problems.clamped import clamped
 from tests.problems.everywhere import agree
 from tests.problems.mechanics import flat
 from tests.problems.piezo import pzt
@@ -240,6 +241,9 @@ def test_a_part_that_ends_inside_separates_as_far_as_it_goes():
     assert np.array_equal(apart[~within], whole[~within])
 
 
+#: A foundation that is not reached.
+APART = {"on": "bottom", "gap": 1.0}
+
 #: Square of the energy norm of the block below, P2 on 64 cells (2.2141e-8), and on 32 (2.208e-8).
 OSCILLATING = 2.2141e-8
 
@@ -249,13 +253,8 @@ OSCILLATING = 2.2141e-8
 @pytest.mark.parametrize("cells", [8, 16, 32])
 def test_loads_that_nodes_do_not_see(cells):
     """Of one and two facets a wave they see nothing; the estimate was .34 and .29 for .93, .90."""
-    block = {
-        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [cells, cells]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "top", "traction": [0.0, "1e-3*sin(16*pi*x)"]}],
-        "contact": {"on": "bottom", "gap": 1.0},
-    }
+    load = {"on": "top", "traction": [0.0, "1e-3*sin(16*pi*x)"]}
+    block = clamped([1.0, 1.0], [cells, cells], load=[load], contact=APART)
     found = solve(parse_case(block)).error
     # The loads are given, and the solution is that of least energy.
     error = np.sqrt(OSCILLATING - found.energy)
@@ -312,12 +311,9 @@ def test_a_layer_without_a_rigid_part():
     """Its gap is infinite: the estimate was no number, and was given as 0."""
     found = []
     for layer in ({"layer": np.inf}, {"layer": 2.0, "gap": 2.0}):  # both touch from the beginning
-        case = {
-            "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [6, 3]},
-            "material": {"young": 1.0, "poisson": 0.3},
-            "fixed": [{"on": "top", "displacement": [0.0, -0.1]}],
-            "contact": {"on": "bottom", "law": "compliance", "limit": np.inf, **layer},
-        }
+        fixed = [{"on": "top", "displacement": [0.0, -0.1]}]
+        contact = {"on": "bottom", "law": "compliance", "limit": np.inf, **layer}
+        case = clamped([2.0, 1.0], [6, 3], fixed=fixed, contact=contact)
         solution = solve(parse_case(case), comm=MPI.COMM_SELF)
         found.append(estimated(solution.problem, solution.state).relative)
     assert found[0] == pytest.approx(found[1], rel=1e-9)
@@ -326,14 +322,8 @@ def test_a_layer_without_a_rigid_part():
 
 def test_the_share_of_contact_is_never_negative():
     """At degree 2 the functions of nodes that touch are negative beside them."""
-    beam = {
-        "mesh": {"generator": "rectangle", "size": [8.0, 1.0], "cells": [8, 2]},
-        "space": {"degree": 2},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "right", "traction": [0.0, -1e-2]}],
-        "contact": {"on": "bottom", "gap": 0.1},
-    }
+    load, contact = {"on": "right", "traction": [0.0, -1e-2]}, {"on": "bottom", "gap": 0.1}
+    beam = clamped([8.0, 1.0], [8, 2], space={"degree": 2}, load=[load], contact=contact)
     solution = solve(parse_case(beam), comm=MPI.COMM_SELF)
     found = estimated(solution.problem, solution.state)
     assert np.count_nonzero(solution.pressure > 1e-3) == 2
@@ -347,14 +337,13 @@ def test_the_share_of_contact_is_never_negative():
 @pytest.mark.parametrize("gap", ["0.02*(x - 1)**2", "abs(x - 1)", "where(x < 1.01, 0, 1)"])
 def test_ranks_agree(gap, degree):
     """A gap that is closed in a part, whose nodes belong to several ranks."""
-    data = {
-        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [12, 6]},
-        "space": {"degree": degree},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "top", "displacement": ["0.01*x*x", -0.1]}],
-        "contact": {"on": "bottom", "gap": gap},
-        "friction": {"law": "coulomb", "mu": 0.3},
-    }
+    data = clamped(
+        [2.0, 1.0], [12, 6],
+        space={"degree": degree},
+        fixed=[{"on": "top", "displacement": ["0.01*x*x", -0.1]}],
+        contact={"on": "bottom", "gap": gap},
+        friction={"law": "coulomb", "mu": 0.3},
+    )  # fmt: skip
 
     def quantities(solution):
         names = ("relative", "total", "contact", "energy", "stiffness_ratio")
@@ -497,14 +486,13 @@ def test_plastic_flow_does_not_lock_where_the_dilatation_is_its_mean():
 def test_the_ratio_of_a_plastic_body(steps):
     """A cylinder in uniaxial stress Y at the strain eps: e is elastic and plastic."""
     young, poisson, strength, eps = 1000.0, 0.3, 1.0, 0.05
-    tables = {
-        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [2, 2]},
-        "space": {"kinematics": "axisymmetric"},
-        "material": {"law": "j2", "young": young, "poisson": poisson, "yield_stress": strength},
-        "fixed": [{"on": "top", "displacement": ["free", f"{-eps}*t"]}],
-        "contact": {"on": "bottom"},
-        "evolution": {"times": [0.0, 1.0], "steps": [steps]},
-    }
+    tables = clamped(
+        [1.0, 1.0], [2, 2],
+        space={"kinematics": "axisymmetric"},
+        material={"law": "j2", "young": young, "poisson": poisson, "yield_stress": strength},
+        fixed=[{"on": "top", "displacement": ["free", f"{-eps}*t"]}],
+        evolution={"times": [0.0, 1.0], "steps": [steps]},
+    )  # fmt: skip
     found = solve(parse_case(tables), comm=MPI.COMM_SELF).error
     elastic = strength / young
     across = poisson * elastic + (eps - elastic) / 2
@@ -543,16 +531,10 @@ def test_a_crystal_that_is_isotropic_has_the_ratio_of_an_isotropic_body(poisson)
 
 def test_fibres_lock():
     """Hardly a stretch along 30 degrees: degree 1 bends far too little, on any triangles."""
-    tables = {
-        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [16, 8]},
-        "material": {
-            "law": "anisotropic", "c11": 1.35, "c12": 0.58, "c13": 0.58, "c33": 1e4, "c44": 0.385,
-            "poling": 30.0,
-        },
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "right", "traction": [0.0, -1e-3]}],
-        "contact": {"on": "bottom", "gap": 1.0},
-    }  # fmt: skip
+    fibres = {"law": "anisotropic", "c11": 1.35, "c12": 0.58, "c13": 0.58, "c33": 1e4, "c44": 0.385}
+    load = {"on": "right", "traction": [0.0, -1e-3]}
+    given = {"material": {**fibres, "poling": 30.0}, "load": [load], "contact": APART}
+    tables = clamped([2.0, 1.0], [16, 8], **given)
     locked = solve(parse_case(tables), comm=MPI.COMM_SELF)
     lines = expectations(build_problem(parse_case(tables)))
     assert any("times as stiff as another" in line for line in lines)
@@ -564,13 +546,9 @@ def test_fibres_lock():
 @pytest.mark.parametrize("sides", [["left"], ["left", "right"]])
 def test_exact_solutions_do_not_lock(sides):
     """Uniform strains of a nearly incompressible block: it was said to be too stiff."""
-    tables = {
-        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
-        "material": {"young": 1.0, "poisson": 0.4999},
-        "fixed": [{"on": side, "symmetry": "x"} for side in sides],
-        "load": [{"on": "top", "traction": [0.0, -1e-3]}],
-        "contact": {"on": "bottom"},
-    }
+    held, load = [{"on": side, "symmetry": "x"} for side in sides], {"on": "top", "pressure": 1e-3}
+    soft = {"young": 1.0, "poisson": 0.4999}
+    tables = clamped([1.0, 1.0], [4, 4], material=soft, fixed=held, load=[load])
     solution = solve(parse_case(tables), comm=MPI.COMM_SELF)
     assert solution.error.stiffness_ratio > 1000
     assert solution.error.relative < 1e-6

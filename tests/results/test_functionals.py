@@ -12,25 +12,25 @@ from contact.case.file import number_at, with_number
 from contact.results.functionals import Differentiable, Integral
 from contact.results.quantities import named_functionals
 from scripts.studies.derivatives import problem
+from tests.problems.clamped import clamped
 
 SELF = MPI.COMM_SELF
 
 
 def plate():
     """Return a block under a turning plate that sinks, with a foundation that moves too."""
-    return parse_case({
-        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [6, 3]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "rigid": [{"on": "top", "displacement": [0.001, "free"], "force": [0.0, -0.02],
-                   "rotation": "free", "moment": 0.0007, "centre": [1.1, 1.2]}],
-        "contact": {"on": "bottom",
-                    "foundation": {"shape": "sphere", "centre": [1.0, -4.0], "radius": 4.0},
-                    "rigid": {"displacement": [0.0, "0.002*t"], "rotation": 0.1,
-                              "centre": [0.5, 0.0]}},
-        "friction": {"law": "coulomb", "mu": 0.4},
-        "evolution": {"times": [0.0, 1.0], "steps": [3]},
-        "solver": {"tolerance": 1e-13},
-    })  # fmt: skip
+    return parse_case(clamped(
+        [2.0, 1.0], [6, 3], fixed=[],
+        rigid=[{"on": "top", "displacement": [0.001, "free"], "force": [0.0, -0.02],
+                "rotation": "free", "moment": 0.0007, "centre": [1.1, 1.2]}],
+        contact={"on": "bottom",
+                 "foundation": {"shape": "sphere", "centre": [1.0, -4.0], "radius": 4.0},
+                 "rigid": {"displacement": [0.0, "0.002*t"], "rotation": 0.1,
+                           "centre": [0.5, 0.0]}},
+        friction={"law": "coulomb", "mu": 0.4},
+        evolution={"times": [0.0, 1.0], "steps": [3]},
+        solver={"tolerance": 1e-13},
+    ))  # fmt: skip
 
 
 def family(name):
@@ -147,9 +147,8 @@ def test_an_integral_of_ones_own(on):
 
 def test_the_integral_of_a_linear_displacement():
     """Of u_y = -y/100 over a block of 2 x 1, and along its left side."""
-    given = {"mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [4, 2]},
-             "material": {"young": 1.0, "poisson": 0.0}, "contact": {"on": "bottom"},
-             "fixed": [{"on": "top", "displacement": [0.0, -0.01]}]}  # fmt: skip
+    fixed, material = {"on": "top", "displacement": [0.0, -0.01]}, {"young": 1.0, "poisson": 0.0}
+    given = clamped([2.0, 1.0], [4, 2], fixed=[fixed], material=material)
     run = solve(parse_case(given), comm=SELF)
     for on, exact in ((None, -0.01), ("left", -0.005)):
         found = Integral(lambda u, phi: u[1], on)(run.problem, run.state)

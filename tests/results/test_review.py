@@ -17,12 +17,22 @@ from contact.results.options import Units
 from contact.writing import written
 from forms.ops import exp
 from scripts.cases import CASES
+from tests.problems.clamped import clamped
 from tests.problems.rigid import indented
 from tests.problems.written import block
 
 
 def reviewed(name: str, *overrides: str) -> Solution:
     return solve(load_case(CASES / f"{name}.toml", ("solver.method=newton", *overrides)))
+
+
+def held_around(way: float, depth: float) -> list[dict]:
+    """Return smooth walls at both sides, of which the right one moves, and a lid that sinks."""
+    return [
+        {"on": "left", "displacement": [0.0, "free"]},
+        {"on": "right", "displacement": [way, "free"]},
+        {"on": "top", "displacement": ["free", -depth]},
+    ]
 
 
 def said(texts: list[str], words: str) -> str:
@@ -82,22 +92,7 @@ def test_large_strains_are_warned_of():
     small = reviewed("bar", "mesh.cells=[16, 4]")
     assert not [text for text in small.warnings if "strains" in text]
     assert 0 < small.deformation.largest_strain < 0.1
-    case = load_case(
-        CASES / "bar.toml",
-        {
-            "mesh.cells": "[4, 4]",
-            "mesh.size": "[1.0, 1.0]",
-            "mesh.parts": "{}",
-            "material": "{law = 'linear', young = 1.0, poisson = 0.3}",
-            "fixed": "[{on = 'left', displacement = [0.0, 'free']}, "
-            "{on = 'right', displacement = [0.0, 'free']}, "
-            "{on = 'top', displacement = ['free', -1.5]}]",
-            "load": "[]",
-            "friction": "{law = 'none'}",
-            "solver": "{method = 'newton'}",
-        },
-    )
-    large = solve(case)
+    large = solve(parse_case(clamped([1.0, 1.0], [4, 4], fixed=held_around(0.0, 1.5))))
     made = large.deformation
     assert made.largest_strain == pytest.approx(1.5, rel=1e-9)
     assert made.least_volume == pytest.approx(-0.5, rel=1e-9)
@@ -125,11 +120,7 @@ def test_pressures_that_are_lost_in_rounding_are_warned_of(depth: float, warned:
     case = block(
         2,
         material={"young": 10.0, "poisson": 0.0},
-        fixed=[
-            {"on": "left", "displacement": [0.0, "free"]},
-            {"on": "right", "displacement": [2.0, "free"]},
-            {"on": "top", "displacement": ["free", -depth]},
-        ],
+        fixed=held_around(2.0, depth),
         friction={"law": "none"},
     )
     solution = solve(case)
@@ -144,11 +135,7 @@ def test_pressures_that_the_tolerance_leaves_open_are_warned_of() -> None:
     case = block(
         2,
         material={"young": 10.0, "poisson": 0.0},
-        fixed=[
-            {"on": "left", "displacement": [0.0, "free"]},
-            {"on": "right", "displacement": [2.0, "free"]},
-            {"on": "top", "displacement": ["free", -1e-11]},
-        ],
+        fixed=held_around(2.0, 1e-11),
         friction={"law": "none"},
         solver={"linear": "iterative"},
     )
@@ -197,22 +184,15 @@ PIECE = {"side": "bottom", "from": 1.5, "to": 2.5}
 def on_a_disc(part: str, depth: float, moved: str, direction: str, steps: int) -> Solution:
     """Press a block and a disc of radius 5 on each other, either of which is moved."""
     up = depth if moved == "foundation" else 0.0
-    data = {
-        "mesh": {
-            "generator": "rectangle",
-            "size": [4.0, 1.0],
-            "cells": [32, 8],
-            "parts": {"middle": PIECE},
-        },
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "top", "displacement": [0.0, up - depth]}],
-        "contact": {
-            "on": part,
-            "foundation": {"shape": "sphere", "centre": [2.0, -5.0], "radius": 5.0},
-            "direction": direction,
-            "rigid": {"displacement": [0.0, up]},
-        },
+    contact = {
+        "on": part,
+        "foundation": {"shape": "sphere", "centre": [2.0, -5.0], "radius": 5.0},
+        "direction": direction,
+        "rigid": {"displacement": [0.0, up]},
     }
+    fixed = [{"on": "top", "displacement": [0.0, up - depth]}]
+    data = clamped([4.0, 1.0], [32, 8], fixed=fixed, contact=contact)
+    data["mesh"]["parts"] = {"middle": PIECE}
     if direction == "axis":
         data["contact"]["axis"] = [0.0, -1.0]
     if steps:

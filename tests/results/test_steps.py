@@ -10,6 +10,7 @@ from contact import build_problem, evolve, parse_case, solve, write_outputs
 from contact.plot.run import read_grid
 from contact.results.resultants import rigid_columns
 from tests.problems.bar import changed
+from tests.problems.clamped import clamped
 from tests.problems.mechanics import close
 from tests.problems.piezo import COUPLING, PERMITTIVITY
 from tests.problems.rigid import plate
@@ -150,21 +151,13 @@ def test_unloading_is_warned_of():
 def test_the_summary_has_the_most_that_rounding_was_granted(tmp_path):
     """A slender beam that is let go at the end: the last step has nothing to be rounded."""
     press = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}
-    case = parse_case(
-        {
-            "mesh": {"generator": "rectangle", "size": [200.0, 1.0], "cells": [200, 1]},
-            "material": {"young": 1.0, "poisson": 0.3},
-            "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-            "load": [{"on": "right", "traction": [0.0, -1e-9], "amplitude": "press"}],
-            "contact": {"on": "bottom", "gap": 1.0},
-            "evolution": {
-                "times": [0.0, 1.0, 2.0],
-                "steps": [1, 1],
-                "amplitudes": {"press": press},
-            },
-        }
-    )
-    solution = solve(case, comm=SELF)
+    tables = clamped(
+        [200.0, 1.0], [200, 1],
+        load=[{"on": "right", "traction": [0.0, -1e-9], "amplitude": "press"}],
+        contact={"on": "bottom", "gap": 1.0},
+        evolution={**STEPS, "steps": [1, 1], "amplitudes": {"press": press}},
+    )  # fmt: skip
+    solution = solve(parse_case(tables), comm=SELF)
     write_outputs(solution, tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert solution.outcome.residuals.equilibrium_rounding == 0

@@ -17,6 +17,7 @@ from contact import FixedPointOptions, InputError, PenaltyOptions, build_problem
 from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.interface.multipliers import Multipliers
+from contact.mesh.contents import Contents
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
@@ -32,7 +33,9 @@ from scripts.cases import CASES
 from scripts.studies.robustness.bodies import Bodies
 from scripts.studies.robustness.check import Mesh, write_msh
 from scripts.studies.robustness.problems import problems
+from tests.problems import files
 from tests.problems.blocks import Blocks
+from tests.problems.clamped import clamped
 from tests.problems.mechanics import constant
 from tests.problems.rings import between_plates, squeezed
 
@@ -91,17 +94,11 @@ def test_a_body_on_supports_that_friction_alone_keeps_in_contact(tmp_path):
 
 def under_a_cylinder(method):
     """Return a block on a plane, pressed by a rigid cylinder up whose flanks it slides."""
-    return parse_case({
-        "mesh": {"generator": "rectangle", "size": [2.0, 0.8], "cells": [20, 8]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "contact": [
-            {"on": "bottom"},
-            {"on": "top", "foundation": {"shape": "sphere", "centre": [1.07, 2.4], "radius": 1.6},
-             "rigid": {"displacement": [0.0, "free"], "force": [0.0, -0.01]}},
-        ],
-        "friction": {"law": "coulomb", "mu": 0.2},
-        "solver": {"method": method},
-    })  # fmt: skip
+    ball = {"shape": "sphere", "centre": [1.07, 2.4], "radius": 1.6}
+    pressed = {"displacement": [0.0, "free"], "force": [0.0, -0.01]}
+    contacts = [{"on": "bottom"}, {"on": "top", "foundation": ball, "rigid": pressed}]
+    given = {"friction": {"law": "coulomb", "mu": 0.2}, "solver": {"method": method}}
+    return parse_case(clamped([2.0, 0.8], [20, 8], fixed=[], contact=contacts, **given))
 
 
 def test_bodies_that_slide_like_rigid_ones_are_not_warned_of():
@@ -155,14 +152,8 @@ def test_single_solutions_are_not_warned_of(kind):
 @pytest.mark.parallel
 def test_any_number_of_ranks():
     """The factor of a beam's contact nodes, which are on all ranks."""
-    tables = {
-        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [32, 8]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "top", "traction": [0.002, -0.01]}],
-        "contact": {"on": "bottom"},
-        "friction": {"law": "coulomb", "mu": 0.6},
-    }
+    load, friction = {"on": "top", "traction": [0.002, -0.01]}, {"law": "coulomb", "mu": 0.6}
+    tables = clamped([4.0, 1.0], [32, 8], load=[load], friction=friction)
     alone, shared = (solve(parse_case(tables), comm=c) for c in (MPI.COMM_SELF, MPI.COMM_WORLD))
     assert np.isfinite(alone.critical_factor)
     assert shared.critical_factor == pytest.approx(alone.critical_factor, rel=1e-8)
@@ -180,22 +171,14 @@ def test_critical_friction_does_not_depend_on_the_axes(yaw, method, tmp_path):
     height, poisson = 0.5345, 0.3
     points = np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, height]])
     points[:, :2] @= turn
-    facets = {"bottom": [0, 1, 2], "slope": [1, 2, 3], "side": [0, 1, 3]}
-    names = [f'2 {k} "{name}"' for k, name in enumerate(facets, 1)]
-    cells = [
-        f"{k} 2 2 {k} {k} {' '.join(str(n + 1) for n in nodes)}"
-        for k, nodes in enumerate(facets.values(), 1)
-    ]
-    lines = [
-        "$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", "4", *names, '3 4 "body"',
-        "$EndPhysicalNames", "$Nodes", "4",
-        *(f"{k} {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(points, 1)),
-        "$EndNodes", "$Elements", "4", *cells, "4 4 2 4 4 1 2 3 4", "$EndElements", "",
-    ]  # fmt: skip
-    (tmp_path / "tet.msh").write_text("\n".join(lines))
+    sides = {"bottom": [0, 1, 2], "slope": [1, 2, 3], "side": [0, 1, 3]}
+    nodes = {name: np.array(own) for name, own in sides.items()}
+    files.write(
+        tmp_path / "tet.inp", Contents(points, [("tetra", np.arange(4)[None])], nodes=nodes)
+    )
     load = np.array([-0.015, 0.018]) @ turn
     case = parse_case({
-        "mesh": {"file": str(tmp_path / "tet.msh")},
+        "mesh": {"file": str(tmp_path / "tet.inp")},
         "material": {"young": 1.0, "poisson": poisson},
         "fixed": [{"on": "slope", "displacement": [0.0, 0.0, 0.0]}],
         "load": [{"on": "side", "traction": [*load.tolist(), -0.01]}],
