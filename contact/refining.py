@@ -225,11 +225,18 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
     domain: Domain | None = case.mesh.build(comm)
     solution: Solution | None = None
     rows: list[dict[str, float]] = []
+    refused: InputError | None = None
     while domain is not None:
-        problem = build_problem(case, comm, domain=domain)
-        if solution is not None and problem.body.layout.unknowns > asked.max_unknowns:
+        try:
+            problem = build_problem(case, comm, domain=domain)
+            if solution is not None and problem.body.layout.unknowns > asked.max_unknowns:
+                break
+            solution = _solved_after(solution, problem, solve)
+        except InputError as error:
+            if solution is None:
+                raise
+            refused = error
             break
-        solution = _solved_after(solution, problem, solve)
         if solution.outcome.signal:
             break
         rows.append(values_of(ADAPT, solution))
@@ -238,8 +245,8 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
     if not solution.outcome.signal:
         check_presses(solution.problem)
     solution.adaptation = rows
-    for identifier, remarks in {"adapt": missed(asked, rows if solution.converged else ())}.items():
-        solution.warnings += [f"{text} [{identifier}]" for text in remarks]
+    remarks = missed(asked, rows if solution.converged else (), refused)
+    solution.warnings += [f"{text} [adapt]" for text in remarks]
     if asked.fraction == 1 and solution.converged:
         solution.intervals = intervals(rows)
     return solution
@@ -275,14 +282,18 @@ def _next_mesh(asked: Adapt, domain: Domain, solution: Solution, count: int) -> 
     return finer if _cells(finer) >= LEAST * _cells(domain) else None
 
 
-def missed(asked: Adapt, rows: Sequence[Mapping[str, float]]) -> Iterator[Remark]:
-    """Say that the error that was asked for has not been reached."""
+def missed(
+    asked: Adapt, rows: Sequence[Mapping[str, float]], refused: InputError | None
+) -> Iterator[Remark]:
+    """Say that the error that was asked for has not been reached, or that a mesh was refused."""
     error = rows[-1]["error"] if rows else 0.0
-    if asked.error is not None and error > asked.error:
-        yield (
-            f"the estimated discretisation error is {error:.2g}, and mesh.adapt.error = "
-            f"{asked.error:g}: the next mesh would have more unknowns than mesh.adapt.max_unknowns"
-        )
+    short = asked.error is not None and error > asked.error
+    if short or refused is not None:
+        goal = f", and mesh.adapt.error = {asked.error:g}" if short else ""
+        ended = "would have more unknowns than mesh.adapt.max_unknowns"
+        if refused is not None:
+            ended = f"is refused, {refused}"
+        yield f"the estimated discretisation error is {error:.2g}{goal}: the next mesh {ended}"
 
 
 def _cells(domain: Domain) -> int:

@@ -224,3 +224,27 @@ def test_cells_that_cannot_be_refined_alone_are_refused_before_the_first_solve(m
     case = {"mesh": {**table, **mesh, "adapt": {}}, "material": {"young": 1.0, "poisson": 0.3}}
     with pytest.raises(InputError, match=r"mesh.adapt.*\[refine\]"):
         build_problem(parse_case({**case, "contact": {"on": on}}))
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("goal", [{}, {"error": 1e-3}])
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        # Numbers at the nodes of the first mesh, and none at one of a finer mesh.
+        ("contact__gap", "1e-3 * sqrt(abs(x - 1.125) - 0.02)"),
+        ("friction__mu", "0.2 * sqrt(abs(x - 2.25) - 0.05)"),
+    ],
+)
+def test_a_finer_mesh_that_is_refused_leaves_the_solution_before(key, value, goal):
+    """A finer mesh was said to overlap, and the solution on the first one was lost."""
+    case = changed(mesh__cells=[8, 2], **(LINEAR | {key: value}))
+    first = solve(parse_case(case), comm=MPI.COMM_WORLD)
+    case["mesh"]["adapt"] = {"fraction": 1.0, "max_unknowns": 5000, **goal}
+    solution = solve(parse_case(case), comm=MPI.COMM_WORLD)
+    assert solution.converged
+    pressed = first.problem.nodes.maximum(first.pressure)
+    assert solution.adaptation[0]["max_pressure"] == pytest.approx(pressed, rel=1e-8)
+    (said,) = [text for text in solution.warnings if text.endswith("[adapt]")]
+    assert "the next mesh is refused, " in said and "[not-finite]" in said
+    assert ("mesh.adapt.error = 0.001" in said) == bool(goal)
