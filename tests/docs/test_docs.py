@@ -87,7 +87,9 @@ def anchors(page: Path) -> set[str]:
 
 @pytest.mark.parametrize("page", [*sorted(DOCS.glob("*.md")), ROOT / "README.md"], ids=str)
 def test_links_lead_somewhere(page: Path) -> None:
-    for target, anchor in re.findall(r"\]\(([^)#:\s]*)(?:#([^)\s]*))?\)", page.read_text()):
+    written = page.read_text()
+    links = re.findall(r"\]\(([^)#:\s]*)(?:#([^)\s]*))?\)", written)
+    for target, anchor in [*links, *re.findall(r'src="([^":]+)()"', written)]:
         there = page.parent / target if target else page
         assert there.exists(), target
         if target.endswith(".png"):  # a whole one

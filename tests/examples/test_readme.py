@@ -1,4 +1,4 @@
-"""The README shows the commands, the output and the links that there are."""
+"""The README shows the commands and the output that there are."""
 
 import re
 import shlex
@@ -49,10 +49,3 @@ def test_the_run_prints_what_is_shown(
     assert numbers[0] == pytest.approx(numbers[1], rel=1e-3)
     errors = [float(re.findall(r"error ([\d.]+) %", text)[0]) for text in (printed.out, shown)]
     assert errors[0] == pytest.approx(errors[1], rel=0.05)
-
-
-def test_links_lead_somewhere() -> None:
-    text = README.read_text()
-    targets = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text) + re.findall(r'src="([^"]+)"', text)
-    for target in targets:
-        assert (ROOT / target).exists(), target

@@ -34,6 +34,15 @@ def operator_of(problem: ContactProblem, kind: str, *, symmetric: bool = True) -
     return SparseOperator(body, nodes, symmetric=symmetric, solver=kind)
 
 
+def with_little_workspace(problem: ContactProblem) -> SparseOperator:
+    """Return an operator whose factorisation gets a tenth of the room that MUMPS expects."""
+    operator = operator_of(problem, "lu")
+    operator.ksp.setOperators(operator.matrix)
+    operator.ksp.getPC().setFactorSetUpSolverType()
+    operator.ksp.getPC().getFactorMatrix().setMumpsIcntl(14, -90)
+    return operator
+
+
 def sticking(problem: ContactProblem) -> Array:
     """Return the blocks of nodes that stick."""
     return np.tile(GAMMA * np.eye(problem.dim), (problem.nodes.nodes.size, 1, 1))
@@ -175,17 +184,13 @@ def test_fixed_unknowns_stay_exactly_where_they_are():
 def test_a_factorisation_takes_the_workspace_it_needs(degree: int) -> None:
     """Where less is left to MUMPS than it has estimated, it is given more."""
     problem = mechanics.bar(WORLD, 16, degree=degree)
-    kept, poor = operator_of(problem, "lu"), operator_of(problem, "lu")
-    poor.ksp.setOperators(poor.matrix)
-    pc = poor.ksp.getPC()
-    pc.setFactorSetUpSolverType()
-    pc.getFactorMatrix().setMumpsIcntl(14, -90)
+    kept, poor = operator_of(problem, "lu"), with_little_workspace(problem)
     sides = np.column_stack([problem.body.external(), np.ones(problem.body.owned)])
     for operator in (kept, poor):
         operator.update("secant", BodyState(problem.body.zero_displacement()), sticking(problem))
     known, found = (operator.solve_all(sides) for operator in (kept, poor))
     np.testing.assert_allclose(found, known, rtol=1e-9, atol=1e-12)
-    assert pc.getFactorMatrix().getMumpsIcntl(14) > 0
+    assert poor.ksp.getPC().getFactorMatrix().getMumpsIcntl(14) > 0
 
 
 @pytest.mark.parametrize("several", [True, False])
@@ -195,10 +200,7 @@ def test_a_failed_factorisation_solves_for_nothing(
     """Several right-hand sides are refused with the words of one; a new factorisation has room."""
     monkeypatch.setattr("contact.linear.petsc.MOST_WORKSPACE", 0)
     problem = mechanics.bar(SELF, 16)
-    operator, kept = operator_of(problem, "lu"), operator_of(problem, "lu")
-    operator.ksp.setOperators(operator.matrix)
-    operator.ksp.getPC().setFactorSetUpSolverType()
-    operator.ksp.getPC().getFactorMatrix().setMumpsIcntl(14, -90)
+    operator, kept = with_little_workspace(problem), operator_of(problem, "lu")
     state, side = BodyState(problem.body.zero_displacement()), problem.body.external()
     operator.update("secant", state, sticking(problem))
     with pytest.raises(InputError, match=r"\[memory\]"):
