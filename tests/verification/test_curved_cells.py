@@ -11,14 +11,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Body, Contact, InputError, NewtonOptions, Sphere
+from contact import Body, Contact, InputError, Sphere
 from contact.mesh.cells import SHAPES
-from contact.mesh.geometry import (
-    area,
-    volume,
-)
+from contact.mesh.geometry import area, volume
 from contact.mesh.transfer import refined
-from contact.methods.newton import Newton
 from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated
 from scripts.force_balance import force_balance
@@ -26,6 +22,7 @@ from scripts.reporting import Report
 from scripts.studies import cell_orders, curved_cells
 from scripts.studies.curved_cells import LAME, LAW, on_a_shaft, solved, supports, two_rings
 from scripts.studies.lame_rings import Lame, error, rings
+from tests.problems.mechanics import state_of
 from tests.problems.written import rows_of
 
 COMM = MPI.COMM_WORLD
@@ -134,8 +131,7 @@ def test_estimates_follow_the_error(name: str) -> None:
     found = []
     for n in (2, 4):
         problem = on_a_shaft(rings(MPI.COMM_SELF, name, 2, (1.0, 2.0), (n,)), 2)
-        state, _ = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
-        found.append(estimated(problem, state).relative)
+        found.append(estimated(problem, state_of(problem, 1e-11)).relative)
     assert found[1] < found[0] / 2.5 < 0.05
 
 
@@ -151,8 +147,7 @@ def test_curved_cells_are_neither_refined_nor_of_mean_dilatation() -> None:
 
 def test_the_resultants_balance_on_curved_facets() -> None:
     problem = two_rings(rings(MPI.COMM_SELF, "triangle", 2, (1.0, 1.5, 2.0), (2, 3)), 2)
-    state, _ = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
-    assert force_balance(problem, state).imbalance < 1e-9
+    assert force_balance(problem, state_of(problem, 1e-11)).imbalance < 1e-9
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -160,7 +155,7 @@ def test_the_resultants_balance_on_curved_facets() -> None:
 def test_the_error_in_l2_is_that_of_ufl(name: str, order: int) -> None:
     domain = rings(MPI.COMM_SELF, name, order, (1.0, 2.0), (2,))
     problem = on_a_shaft(domain, 2)
-    state, _ = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
+    state = state_of(problem, 1e-11)
 
     def exact(x: np.ndarray) -> np.ndarray:
         radius = np.hypot(x[0], x[1])
