@@ -58,9 +58,10 @@ def shown(given: Any) -> str:
 
 
 def nearest(name: str, options: Iterable[str], words: str = " (did you mean {}?)") -> str:
-    """Return a suggestion of the nearest name; an empty text if none is near."""
-    near = difflib.get_close_matches(name, list(options), n=1)
-    return words.format(clipped(near[0])) if near else ""
+    """Return a suggestion of the nearest name, whatever its capitals; an empty text if none is."""
+    known = {option.lower(): option for option in options}
+    near = difflib.get_close_matches(name.lower(), known, n=1)
+    return words.format(clipped(known[near[0]])) if near else ""
 
 
 class InputError(ValueError):

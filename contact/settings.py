@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from dataclasses import field as default
 from typing import Annotated, Any, TypeAlias, TypeVar, get_args
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -34,11 +34,13 @@ def fault(key: str, given: Any, accepted: str, identifier: str = "") -> InputErr
 
     `key` is the dotted path below the model that raises it, empty for the model's own value;
     `given` the value of the case file, or words inside `Words`; `accepted` the accepted values in
-    words. By default the `identifier` of an `InputError` is that of a missing key, or of a wrong
-    value.
+    words, texts in quotes: the one nearest to a given text is its hint. By default the `identifier`
+    of an `InputError` is that of a missing key, or of a wrong value.
     """
     identifier = identifier or ("missing" if given is MISSING else "value")
     words = given if isinstance(given, Words) else f"given {shown(given)}"
+    if isinstance(given, str) and not isinstance(given, Words) and f'"{given}"' not in accepted:
+        words += nearest(given, re.findall('"([^"]+)"', accepted), ', did you mean "{}"?')
     said = f"{words}; accepted: {accepted}"
     return Fault(f"{key}: {said}", identifier) if key else InputError(said, identifier)
 
@@ -56,9 +58,7 @@ class Accepted:
     """The accepted values of a type in words, which its errors then have."""
 
     text: str
-    key: str = ""  #: of kinds of tables: the key that tells them apart
-    #: Its values, by themselves and by names that users may take for them: hints.
-    names: Mapping[str, str] = default(default_factory=dict, hash=False)
+    key: str = ""  #: of kinds of tables: the key that tells them apart, its values last in `text`
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         """Wrap the validation of the type."""
@@ -71,12 +71,10 @@ class Accepted:
             for one in error.errors(include_url=False):
                 if keys_in(one["loc"]) or one["type"] == "value_error":
                     raise  # of a value inside, or complete
-            if not (isinstance(given, Mapping) and self.key in given):
+            if not (self.key and isinstance(given, Mapping)):
                 raise fault("", given, self.text) from None
-            words = shown(given[self.key])
-            near = self.names.get(nearest(words.lower(), self.names, "{}"))
-            hint = f", did you mean {shown(near)}?" if near else ""
-            raise fault(self.key, Words(f"given {words}{hint}"), self.text) from None
+            values = self.text.partition(f"{self.key} = ")[2]
+            raise fault(self.key, given.get(self.key, MISSING), values) from None
 
 
 @dataclass(frozen=True)

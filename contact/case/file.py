@@ -70,11 +70,7 @@ else:
     Solver = Annotated[
         reduce(or_, (Annotated[kind, Tag(f":{name}")] for name, kind in OPTIONS.items())),
         Discriminator(_method_of),
-        Accepted(
-            f"a table with method = {either(map(shown, OPTIONS))}",
-            "method",
-            {name: name for name in OPTIONS},
-        ),
+        Accepted(f"a table with method = {either(map(shown, OPTIONS))}", "method"),
     ]
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 import meshes
-from contact.errors import InputError
+from contact.errors import InputError, shown
 from contact.mesh import grid
 from contact.mesh.cells import SHAPES, Shape
 from contact.mesh.domain import Domain, Marker, cells_in, facets_inside, with_further_names
@@ -22,7 +22,7 @@ from contact.mesh.reader import ACCEPTED, from_file, from_generator
 from contact.mesh.transfer import check_adaptable, refined
 from contact.methods.signals import killed_on_signal
 from contact.model.fields import Field as Given
-from contact.model.messages import unknown
+from contact.model.messages import either, unknown
 from contact.model.section import (
     Axis,
     Either,
@@ -316,7 +316,7 @@ def _check_memory(comm: MPI.Intracomm, cells: int) -> None:
 
 def _check_parameters(name: str, parameters: Mapping[str, Any]) -> None:
     if name not in meshes.GENERATORS:
-        raise fault("generator", name, ", ".join((*grid.SIDES, *meshes.GENERATORS)))
+        raise fault("generator", name, either(map(shown, (*grid.SIDES, *meshes.GENERATORS))))
     accepted = meshes.parameters(name)
     for key, value in parameters.items():
         if key not in accepted:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from contact.errors import InputError
+from contact.errors import InputError, nearest
 from contact.typing import Array
 from forms.elasticity import Anisotropic, hexagonal, isotropic
 from forms.piezo import Piezo, from_voigt, hexagonal_voigt
@@ -177,7 +176,5 @@ def find(name: str, path: Path = PACKAGED) -> Entry:
     known = library(path)
     if name in known:
         return known[name]
-    lower = {other.lower(): other for other in known}
-    near = difflib.get_close_matches(name.lower(), lower, n=1)
-    hint = f" (did you mean {lower[near[0]]}?)" if near else ""
-    raise InputError(f"{name}: no such material{hint}; accepted: {', '.join(known)}", "library")
+    hint, names = nearest(name, known), ", ".join(known)
+    raise InputError(f"{name}: no such material{hint}; accepted: {names}", "library")

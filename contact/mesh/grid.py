@@ -9,7 +9,7 @@ import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.errors import InputError
+from contact.errors import InputError, shown
 from contact.mesh.domain import Domain, exterior_facets, with_names
 
 
@@ -214,7 +214,7 @@ def plan(
 
 def _patch(key: str, piece: Piece, grid: _Grid, sides: Mapping[str, tuple[int, int]]) -> _Patch:
     if piece.side not in sides:
-        raise GridError(f"{key}.side", piece.side, ", ".join(sides))
+        raise GridError(f"{key}.side", piece.side, ", ".join(map(shown, sides)))
     axis, end = sides[piece.side]
     along = [i for i in range(len(grid[0])) if i != axis]
     low, high, h = (values[along] for values in grid)

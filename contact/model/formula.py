@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache, reduce
 from types import CodeType
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from contact.arguments import OfTime, Returned
-from contact.errors import InputError, clipped, counted, shown
+from contact.errors import InputError, clipped, counted, nearest, shown
 from forms import ops
 
 if TYPE_CHECKING:
@@ -240,6 +240,12 @@ def _finite(value: Any, source: object) -> float:
     return number
 
 
+def _unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
+    """Return the error for an unknown name or function, with the nearest one."""
+    hint = nearest(name, known, ", did you mean {}?")
+    return InputError(f"unknown {kind} {clipped(name)}{hint}; accepted: {ACCEPTED}", "formula")
+
+
 def _translated(node: ast.expr) -> ast.expr:
     """Return an accepted node with floats for numbers, and calls for comparisons."""
     match node:
@@ -248,7 +254,7 @@ def _translated(node: ast.expr) -> ast.expr:
         case ast.Name(id=name):
             if name in (*VARIABLES, "pi"):
                 return node
-            raise InputError(f"unknown name {clipped(name)}; accepted: {ACCEPTED}", "formula")
+            raise _unknown("name", name, (*VARIABLES, "pi"))
         case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=operand):
             return ast.UnaryOp(sign, _translated(operand))
         case ast.BinOp(op=ast.BitXor()):
@@ -264,9 +270,7 @@ def _translated(node: ast.expr) -> ast.expr:
                 )
         case ast.Call(func=ast.Name(id=name) as function, args=args, keywords=[]):
             if name not in FUNCTIONS:
-                raise InputError(
-                    f"unknown function {clipped(name)}; accepted: {ACCEPTED}", "formula"
-                )
+                raise _unknown("function", name, FUNCTIONS)
             translated, (_, least, most) = [*map(_translated, args)], FUNCTIONS[name]
             if not least <= len(args) <= most:
                 more = "" if least == most else " or more"

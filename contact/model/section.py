@@ -399,6 +399,7 @@ Names: TypeAlias = Annotated[
 #: A file, whose path a dump writes by the function ``path`` of its context.
 File: TypeAlias = Annotated[
     str,
+    Bounds(min_length=1),
     AfterValidator(_placed),
     PlainSerializer(lambda path, info: (info.context or {}).get("path", str)(path)),
 ]

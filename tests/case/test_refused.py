@@ -72,7 +72,24 @@ BAD = {
     "tolerance": {"solver__tolerance": 0.0},
     "iterations": {"solver__max_outer": 0},
     "output": {"output": {"fields": "vtk"}},
+    "no mesh file": {"mesh": {"file": ""}},
+    "coefficient without law": {"friction__mu": {"a": 0.5}},
 }
+#: Texts of a list of accepted ones, nearly: changes, and the hint.
+NEARLY = [
+    ({"material__law": "J2"}, "j2"),
+    ({"material": {"name": "PVDF", "units": "gpa"}}, "GPa"),
+    ({"friction__law": "coulom"}, "coulomb"),
+    ({"friction__mu": {"law": "slipp", "rho": 1.0}}, "slip"),
+    ({"mesh": {"generator": "boxx"}}, "box"),
+    ({"mesh__generator": "Rectangel"}, "rectangle"),
+    ({"mesh__parts__loaded__side": "tops"}, "top"),
+    ({"space__kinematics": "axisymetric"}, "axisymmetric"),
+    ({"contact__direction": "Axis"}, "axis"),
+    ({"solver": {"method": "uzawa", "r": "atuo"}}, "auto"),
+    ({"solver__method": "Penalty"}, "penalty"),
+    ({"case": {"units": "N-mm-Mpa"}}, "N-mm-MPa"),
+]
 
 
 @pytest.mark.wording
@@ -83,6 +100,11 @@ def test_messages_of_bad_cases(snapshot):
     }
     assert all(message.startswith("bar.toml: ") for message in said.values())
     snapshot("refused-cases", said)
+
+
+@pytest.mark.parametrize(("changes", "near"), NEARLY)
+def test_the_nearest_accepted_text_is_named(changes, near) -> None:
+    assert f', did you mean "{near}"?; accepted: ' in message_of(parse_case, changed(**changes))
 
 
 def test_a_text_is_no_case() -> None:
@@ -107,7 +129,8 @@ BAD_SHAPES = {
     "axis alone": (PLANE, {"axis": [0, 0, 1]}),
     "no file": ({"shape": "surface"}, {}),
     "shape": ({"shape": "ball"}, {}),
-    "class of a shape": ({"shape": "level"}, {}),
+    "shape nearly": ({"shape": "Shpere"}, {}),
+    "no shape": ({"centre": [0, 0, 0], "radius": 1.0}, {}),
 }
 
 
@@ -123,8 +146,8 @@ def test_messages_of_bad_shapes(snapshot):
 
 
 @pytest.mark.parametrize("kind", SHAPES)
-def test_the_name_of_a_class_hints_at_its_shape(kind):
-    said = message_of(shaped, {"shape": f"{kind.__name__}s"}, {})
+def test_a_name_that_is_nearly_a_shape_hints_at_it(kind):
+    said = message_of(shaped, {"shape": f"{kind.shape.title()}s"}, {})
     assert f'did you mean "{kind.shape}"?' in said
 
 
