@@ -409,6 +409,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--renew", action="store_true", help="store the values of these problems")
     parser.add_argument("--processes", type=int, default=min(2, os.cpu_count() or 1))
     given = parser.parse_args(arguments)
+    if given.processes < 1:
+        parser.error(f"--processes {given.processes}; accepted: a whole number from 1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # before anything loads the BLAS
     from mpi4py import MPI
 

@@ -57,6 +57,13 @@ def test_every_case_and_example_is_a_problem_and_every_problem_is_stored():
     assert {*golden.read(golden.TABLE)} == {*PROBLEMS}
 
 
+@pytest.mark.parametrize("wrong", [["--processes", "0"], ["--processes=-2"], ["--only", "nothing"]])
+def test_wrong_arguments_are_told_without_a_traceback(capsys, wrong: list[str]):
+    with pytest.raises(SystemExit, match="2"):
+        golden.main(wrong)
+    assert "accepted: " in capsys.readouterr().err
+
+
 def test_the_table_is_sorted_and_has_each_row_once():
     with golden.TABLE.open(encoding="utf-8") as stream:
         rows = [(row["problem"], row["quantity"]) for row in csv.DictReader(stream)]
