@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -18,20 +18,22 @@ from contact.case.file import Case
 from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
-from contact.mesh.geometry import facet_normals, geometry_nodes
-from contact.model.fields import at_time
-from contact.plot.foundation import add_foundation, facing
+from contact.mesh.geometry import area, facet_normals, geometry_nodes
+from contact.model.fields import at_time, knows_time
+from contact.plot.foundation import BEYOND, HATCHED, add_foundation, facing
 from contact.plot.run import polygons
 from contact.plot.space import Camera, drawable, render
 from contact.plot.style import BLUE, SKY, STYLE, heading
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
-#: A part: its name in the legend, its facets by their corners, (n, c, d), and forces on these.
-Part: TypeAlias = tuple[str, Array, Array | None]
+#: A part: its name in the legend, its facets by their corners, (n, c, d), and the places and the
+#: vectors of a load or displacement, (m, d).
+Part: TypeAlias = tuple[str, Array, Array, Array]
 
-#: Most arrows of a load, and the length of the longest over the extent of the body.
-ARROWS, REACH = 32, 0.15
+#: About the most arrows of a load, the length of the longest over the extent of the body, and that
+#: of others over it at least.
+ARROWS, REACH, SHORTEST = 32, 0.15, 0.25
 
 
 def save_setup(case: Case, problem: ContactProblem, folder: Path) -> list[Path]:
@@ -51,23 +53,27 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
     for other in (0, domain.dim):
         domain.mesh.topology.create_connectivity(domain.dim - 1, other)
 
-    def gathered(values: Array | None) -> Any:
-        shares = None if values is None else comm.gather(values)
+    def gathered(values: Array) -> Any:
+        shares = comm.gather(values)
         return None if shares is None else np.concatenate(shares)
 
     boundary = gathered(_corners(domain, exterior_facets(domain.mesh)))
     around = facet_of(shape_of(domain.mesh).corners).around if domain.dim == 2 else []
     cells = gathered(geometry_nodes(domain)[:, around])
-    parts = [(words, *map(gathered, rest)) for words, *rest in _parts(case, problem)]
+    parts: list[Part] = [
+        (words, gathered(facets), gathered(places), gathered(vectors))
+        for words, facets, places, vectors in _parts(case, problem)
+    ]
     surface = _foundation(problem)
     if comm.rank > 0:
         return None
+    arrows = _arrows(parts, boundary)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.9, 5.0))
         if domain.dim == 2:
-            _draw_plane(figure, cells, boundary, parts, surface)
+            _draw_plane(figure, cells, boundary, parts, arrows, surface)
         else:
-            _draw_space(figure, boundary, parts, surface)
+            _draw_space(figure, boundary, parts, arrows, surface)
         figure.suptitle(heading(case.title), fontsize="medium")
         figure.legend(loc="outside lower center", ncols=3, fontsize=7)
         if domain.dim == 2:
@@ -78,32 +84,61 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
 
 
 def _parts(case: Case, problem: ContactProblem) -> Iterator[Part]:
-    """Yield the parts on this rank."""
+    """Yield the parts, each with its facets and its load on this rank. Collective.
+
+    Loads are those at the end of the first stage, without their amplitudes; forces are spread
+    over their parts, as tractions are given.
+    """
     domain = problem.domain
+    time = 1.0 if case.evolution is None else case.evolution.times[1]
 
     def facets(part: str) -> Array:
         return _corners(domain, domain.facets_anywhere(part))
 
+    def named(section: Any, words: str, fields: Iterable[Any]) -> str:
+        formula = f", t = {time:g}" if case.evolution and knows_time([*fields]) else ""
+        return words + (f", amplitude {section.amplitude}" if section.amplitude else formula)
+
+    def components(fields: Iterable[tuple[int, Any]], places: Array) -> Array:
+        found = np.zeros_like(places)
+        for k, field in fields:
+            found[:, k] = at_time(field, time).numpy(places)
+        return found
+
+    none = np.empty((0, domain.dim))
     for contact in problem.contacts:
-        yield f"contact {contact.on}", facets(contact.on), None
+        yield f"contact {contact.on}", facets(contact.on), none, none
         if contact.against is not None:
-            yield f"against {contact.against}", facets(contact.against), None
-    for key in ("fixed", "elastic", "bolt", "electrode", "rigid"):
+            yield f"against {contact.against}", facets(contact.against), none, none
+    for fixed in case.fixed:
+        corners = facets(fixed.on)
+        places = corners.mean(axis=1)
+        moved = components(fixed.components.items(), places)
+        words = named(fixed, f"fixed {fixed.on}", fixed.given.values())
+        yield words, corners, places, moved
+    for key in ("elastic", "bolt", "electrode", "rigid"):
         for section in getattr(case, key):
-            yield f"{key} {section.on}", facets(section.on), None
-    for load in problem.description.loads:
+            yield f"{key} {section.on}", facets(section.on), none, none
+    for load in case.load:
         if load.on is None:
-            continue
-        corners = facets(load.on)
-        middle = corners.mean(axis=1)
-        force = np.zeros_like(middle)
-        for k, field in enumerate(load.density or load.force or ()):
-            force[:, k] += at_time(field, 1.0).numpy(middle)
+            corners, places = (
+                none[:, None].repeat(domain.dim, axis=1),
+                geometry_nodes(domain).mean(axis=1),
+            )
+        else:
+            corners = facets(load.on)
+            places = corners.mean(axis=1)
+        force = components(enumerate(load.density or ()), places)
+        if load.force is not None:
+            assert load.on is not None
+            force += components(enumerate(load.force), places) / area(domain, load.on)
         if load.pressure is not None:
+            assert load.on is not None
             normal = facet_normals(domain, load.on, 1)[2].mean(axis=1)
             normal /= np.linalg.norm(normal, axis=1)[:, None]
-            force -= np.reshape(at_time(load.pressure, 1.0).numpy(middle), (-1, 1)) * normal
-        yield f"load {load.on}", corners, force
+            force -= np.reshape(at_time(load.pressure, time).numpy(places), (-1, 1)) * normal
+        words = named(load, f"load {load.on or 'in the whole body'}", load.named.values())
+        yield words, corners, places, force
 
 
 def _corners(domain: Domain, facets: Indices) -> Array:
@@ -116,79 +151,128 @@ def _corners(domain: Domain, facets: Indices) -> Array:
 
 
 def _foundation(problem: ContactProblem) -> Array:
-    """Return contact nodes, and where they would meet rigid foundations, (m, 2, d). Collective."""
-    found: list[Array] = [np.zeros((0, 2, problem.dim))]
+    """Return contact nodes, where they meet rigid foundations, and normals, (m, 3, d). Collective.
+
+    The normals are those to the foundation.
+    """
+    found: list[Array] = [np.zeros((0, 3, problem.dim))]
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
         nodes = geometry.nodes
         if contact.against is None:
             near = np.isfinite(nodes.gap)
             places = nodes.points + np.where(near, nodes.gap, 0.0)[:, None] * nodes.normal
-            found.append(nodes.gather(np.stack([nodes.points, places], axis=1)[near]))
+            both = np.stack([nodes.points, places, nodes.normal], axis=1)
+            found.append(nodes.gather(both[near]))
     return np.concatenate(found)
 
 
-def _arrows(part: Part, boundary: Array) -> tuple[Array, Array]:
-    """Return starts and steps of the arrows of a load, outside the body."""
-    _, facets, force = part
-    if force is None or not np.any(force):
-        return facets[:0, 0], facets[:0, 0]
-    centre, lengths = facets.mean(axis=1), np.linalg.norm(force, axis=1)
-    some = np.linspace(0, len(centre) - 1, min(ARROWS, len(centre))).round().astype(int)
-    chosen = np.lexsort(centre.T)[some]
-    chosen = chosen[lengths[chosen] > 0.02 * lengths.max()]
-    reach = REACH * np.ptp(boundary, axis=(0, 1)).max()
-    step, start = reach * force[chosen] / lengths.max(), centre[chosen]
-    pulls = np.einsum("ni,ni->n", step, start - boundary.mean(axis=(0, 1))) > 0
-    return start - np.where(pulls[:, None], 0.0, step), step
+def _in_front(boundary: Array, surface: Array) -> tuple[Array, Array]:
+    """Return places on a foundation of the corners of facets, NaN for none, and the normals."""
+    if not surface.size:
+        return np.full_like(boundary, np.nan), np.zeros_like(boundary)
+    apart, nodes = KDTree(surface[:, 0]).query(boundary)
+    there = (apart <= 1e-9 * np.ptp(boundary, axis=(0, 1)).max())[..., None]
+    return np.where(there, surface[nodes, 1], np.nan), surface[nodes, 2]
+
+
+def _arrows(parts: list[Part], boundary: Array) -> list[tuple[Array, Array]]:
+    """Return starts and steps of the arrows of each part: of those on a boundary outside the body.
+
+    Loads on parts have one scale, so have displacements, and so have loads in the whole body.
+    """
+    reach, middle = REACH * np.ptp(boundary, axis=(0, 1)).max(), boundary.mean(axis=(0, 1))
+    largest: dict[tuple[str, int], float] = {}
+    kinds = [(words.partition(" ")[0], min(len(facets), 1)) for words, facets, *_ in parts]
+    for kind, (*_, vectors) in zip(kinds, parts, strict=True):
+        most = np.linalg.norm(vectors, axis=1).max(initial=0.0)
+        largest[kind] = max(most, largest.get(kind, 0.0))
+    found = []
+    for kind, (_, _, places, vectors) in zip(kinds, parts, strict=True):
+        sizes = np.linalg.norm(vectors, axis=1)
+        most, on_part = sizes.max(initial=0.0), kind[1]
+        chosen = _spread(places, round(ARROWS ** (1 / (places.shape[1] - on_part))))
+        chosen = chosen[sizes[chosen] > 0.02 * most]
+        scale = reach * max(1 / largest[kind], SHORTEST / most) if most else 0.0
+        start, step = places[chosen], scale * vectors[chosen]
+        pushes = np.einsum("ni,ni->n", step, start - middle) <= 0
+        behind = np.where(on_part, pushes, 0.5)
+        found.append((start - behind[:, None] * step, step))
+    return found
+
+
+def _spread(places: Array, count: int) -> Indices:
+    """Return the places nearest to the centres of those cells of a grid that have some."""
+    if not len(places):
+        return np.empty(0, dtype=np.int32)
+    low, size = places.min(axis=0), float(np.ptp(places, axis=0).max()) or 1.0
+    cells = np.unique(np.clip(np.floor(count * (places - low) / size), 0, count - 1), axis=0)
+    return np.unique(KDTree(places).query(low + (cells + 0.5) / count * size)[1])
 
 
 def _draw_plane(
-    figure: Figure, cells: Array, boundary: Array, parts: list[Part], surface: Array
+    figure: Figure,
+    cells: Array,
+    boundary: Array,
+    parts: list[Part],
+    arrows: list[tuple[Array, Array]],
+    surface: Array,
 ) -> None:
     """Draw a plane body by its cells, shape (n, c, 2), and boundary edges, (m, 2, 2)."""
     ax = figure.subplots()
     fine = 0.3 * min(1.0, 50 / np.sqrt(len(cells)))
     ax.add_collection(PolyCollection(list(cells), facecolors="0.96", edgecolors="0.75", lw=fine))
     ax.add_collection(LineCollection(list(boundary), colors="0.4", lw=0.6))
-    for k, part in enumerate(parts):
+    for k, (part, (start, step)) in enumerate(zip(parts, arrows, strict=True)):
         wide = 1.5 + 2.5 * (1 - k / len(parts))  # parts in one place are seen beside each other
         lines = LineCollection(list(part[1]), colors=f"C{k}", lw=wide, label=part[0])
         lines.set_capstyle("round")
         ax.add_collection(lines)
-        start, step = _arrows(part, boundary)
         if start.size:
             exact: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
             ax.quiver(*start.T, *step.T, color=f"C{k}", width=0.003, **exact)
             ax.update_datalim(np.concatenate([start, start + step]))
-    if surface.size:
-        ax.plot(*surface[:, 1].T, ".", ms=3, color="0.4", label="foundation")
+    places, normal = _in_front(boundary, surface)
+    size = np.ptp(boundary, axis=(0, 1)).max()
+    gap = np.linalg.norm(places - boundary, axis=2).max(axis=1)
+    near = gap <= BEYOND * size + np.nanmin(gap, initial=np.inf)
+    if near.any():
+        far = places[near] + HATCHED * size * normal[near]
+        bands = np.concatenate([places[near], far[:, ::-1]], axis=1)
+        ax.add_collection(LineCollection(list(places[near]), colors=BLUE, lw=0.6, zorder=4))
+        hatch: dict[str, Any] = {"hatch": "//////", "edgecolors": BLUE, "lw": 0}
+        ax.add_collection(PolyCollection(list(bands), facecolors="none", **hatch))
+        ax.update_datalim(bands.reshape(-1, 2))
+        ax.fill([], [], facecolor="none", edgecolor=BLUE, hatch="//////", lw=0, label="foundation")
     ax.set_aspect("equal")
     ax.autoscale_view()
 
 
-def _draw_space(figure: Figure, boundary: Array, parts: list[Part], surface: Array) -> None:
+def _draw_space(
+    figure: Figure,
+    boundary: Array,
+    parts: list[Part],
+    arrows: list[tuple[Array, Array]],
+    surface: Array,
+) -> None:
     """Draw a body in 3-D by the facets of its boundary, shape (m, c, 3)."""
-    arrows = [_arrows(part, boundary) for part in parts]
-    size = float(np.ptp(boundary, axis=(0, 1)).max())
-    places, gap = np.full_like(boundary, np.nan), np.zeros(boundary.shape[:2])
-    if surface.size:
-        apart, nodes = KDTree(surface[:, 0]).query(boundary)
-        places = np.where((apart > 1e-9 * size)[..., None], np.nan, surface[nodes, 1])
-        gap = np.linalg.norm(places - boundary, axis=2)
-    shape = facing(places, gap, size)
+    places = _in_front(boundary, surface)[0]
+    gap = np.linalg.norm(places - boundary, axis=2)
+    shape = facing(places, gap, float(np.ptp(boundary, axis=(0, 1)).max()))
 
     def add(plotter: Any) -> None:
         edges = {"show_edges": True, "edge_opacity": 0.4, "line_width": 0.5}
         plotter.add_mesh(polygons(boundary), color="#EEEEEE", opacity=0.3, **edges)
         for k, (part, (start, step)) in enumerate(zip(parts, arrows, strict=True)):
             colour = to_hex(f"C{k}")
-            plotter.add_mesh(polygons(part[1]), color=colour, opacity=0.5, lighting=False)
+            if len(part[1]):
+                plotter.add_mesh(polygons(part[1]), color=colour, opacity=0.5, lighting=False)
             if start.size:
                 plotter.add_arrows(start, step, color=colour)
         if shape.n_cells:
             add_foundation(plotter, shape)
 
-    seen = np.concatenate([boundary.reshape(-1, 3), shape.points, *(start for start, _ in arrows)])
+    ends = [np.concatenate([start, start + step]) for start, step in arrows]
+    seen = np.concatenate([boundary.reshape(-1, 3), shape.points, *ends])
     ax = figure.subplots()
     ax.axis("off")
     if drawable():

@@ -161,6 +161,70 @@ def test_the_arrows_of_a_pressure_are_outside_the_body(pressure, side):
     assert np.all(arrows.Y >= 2 - 1e-9) and np.all(arrows.Y + arrows.V >= 2 - 1e-9)
 
 
+def test_tractions_forces_and_pressures_have_one_scale():
+    """A force is spread over its part; loads in the whole body have arrows in it."""
+    size = [4.0, 2.0]
+    data = {
+        "mesh": {"generator": "rectangle", "size": size, "cells": [8, 4]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [
+            {"on": "top", "traction": [0.0, -1.0], "force": [0.0, -4.0], "amplitude": "press"},
+            {"on": "right", "force": [1.0, 0.0], "pressure": "-t/2"},
+            {"everywhere": True, "body_force": ["x", 0.0]},
+        ],
+        "contact": {"on": "bottom"},
+        "evolution": {
+            "times": [0.0, 1.0, 2.0],
+            "steps": [1, 1],
+            "amplitudes": {"press": {"time": [0.0, 2.0], "value": [0.0, 1.0]}},
+        },
+    }
+    case = parse_case(data)
+    figure = draw_setup(case, build_problem(case))
+    top, right, body = (c for c in figure.axes[0].collections if isinstance(c, Quiver))
+    assert top.V == pytest.approx(-0.15 * 4.0) and right.U == pytest.approx(0.15 * 4.0 / 2)
+    assert np.all(right.X >= 4.0) and figure.axes[0].get_xlim()[1] > 4.0 + 0.3
+    assert body.U.max() < 0.6 + 1e-9 and np.all((body.Y > 0) & (body.Y < 2.0))
+    np.testing.assert_allclose(body.U / (body.X + body.U / 2), 0.6 / (4.0 - 0.5 / 3), rtol=0.05)
+    words = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert words >= {"load top, amplitude press", "load right, t = 1", "load in the whole body"}
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_the_picture_in_3d_has_all_of_the_arrows(monkeypatch, side):
+    seen, arrows = [], []
+
+    class Plotter:
+        def add_arrows(self, start, step, **_):
+            arrows.extend([*start, *(start + step)])
+
+        def __getattr__(self, name):
+            return lambda *_, **__: None
+
+    def render(_, camera, add):
+        seen.append(camera)
+        add(Plotter())
+
+    monkeypatch.setattr("contact.cli.setup.render", render)
+    data = {
+        "mesh": {"generator": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0, 0.0]}],
+        "load": [
+            {"on": "top", "traction": [0.0, 0.0, side]},
+            {"on": "right", "traction": [side, 0.0, 0.0]},
+            {"everywhere": True, "body_force": [0.0, 0.0, -1.0]},
+        ],
+        "contact": {"on": "bottom"},
+    }
+    case = parse_case(data)
+    draw_setup(case, build_problem(case))
+    flat = seen[0].flat(np.array(arrows))
+    assert np.ptp(arrows, axis=0)[[0, 2]] == pytest.approx(1.15, abs=0.2)
+    assert np.all((flat > seen[0].low) & (flat < seen[0].high))
+
+
 def test_check_writes_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     before = dict(matplotlib.rcParams)
