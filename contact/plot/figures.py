@@ -45,6 +45,8 @@ def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Galle
     contact is seen, and pressure, status and friction along the mean normal of the contact. With
     `fields` the body is drawn alone, coloured by each of them.
     """
+    if run.plane and look.view is not None:
+        raise flat("--view")
     found = Gallery()
     shown = run.plane or drawable()
     with matplotlib.rc_context(look.style):
@@ -94,12 +96,16 @@ def plot(
     return _added(folder, lambda new: draw(read(), new, fields, formats, look))
 
 
+def flat(option: str) -> InputError:
+    """Return the error for a view of a body in 2-D."""
+    words = "a body in 2-D is not turned; accepted: a run in 3-D, or contact plot without"
+    return InputError(f"{option}: {words}", "figure-option")
+
+
 def window(run: Run, field: str | None = None) -> Any:
     """Return the plotter of pyvista that shows a body in 3-D, by default with contact pressure."""
     if run.plane:
-        raise InputError(
-            "a plane body is not turned; accepted: a run in 3-D, or contact plot", "figure-option"
-        )
+        raise flat("a window or a page")
     scene = Scene.of(run) if field is None else picture(run, field).scene
     return scene.window(field or "contact pressure")
 

@@ -427,17 +427,19 @@ def contact_figure(run: Run, look: Look) -> Figure:
         norm = Normalize(*scene.colours["clim"])
         colour_bar(figure, [whole, *axes], norm, "viridis", f"{label}, peak {norm.vmax:.4g}")
     columns = 2 if narrow else 4
-    figure.legend(handles=_legend(run, frictional), ncols=columns, loc="outside lower center")
+    figure.legend(
+        handles=_legend(run, scene, frictional), ncols=columns, loc="outside lower center"
+    )
     return figure
 
 
-def _legend(run: Run, frictional: bool) -> list[Patch]:
+def _legend(run: Run, scene: Scene, frictional: bool) -> list[Patch]:
     """Return the legend of the status with the numbers of contact nodes."""
     found = patches(frictional)
     for patch, zone in zip(found, ZONES if frictional else TOUCHING, strict=True):
         count = np.count_nonzero(run.table["status"] == zone)
         patch.set_label(f"{patch.get_label()}: {count} nodes")
-    if np.any(run.table["rigid"]):
+    if scene.foundation.n_cells:
         found.append(Patch(facecolor=to_rgba(SKY, 0.3), edgecolor=BLUE, label="foundation"))
     return found
 

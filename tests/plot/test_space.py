@@ -207,6 +207,16 @@ def test_the_peak_is_that_of_all_nodes() -> None:
     assert max(made.norm.vmax, float(made.label.split()[-1]) if "peak" in made.label else 0) == 100
 
 
+@pytest.mark.parametrize("gap", [0.0, 1.0])
+def test_the_legend_has_a_foundation_that_is_drawn(gap: float) -> None:
+    run = pressed(contact={"on": "bottom", "gap": gap})
+    run = run if gap == 0 else replace(run, surface=run.surface.copy())
+    if gap:  # facets without a known foundation in front of them
+        run.surface.point_data["row"][:] = -1
+    labels = [text.get_text() for text in contact_figure(run, Look()).legends[0].get_texts()]
+    assert ("foundation" in labels) == (gap == 0)
+
+
 def test_a_page_to_turn_a_body_in(tmp_path, capsys, monkeypatch):
     """By PyVista's own packages; without them a message names these, and no file is left."""
     out = tmp_path / "out"
