@@ -119,9 +119,9 @@ def export(folder: Path, fields: Sequence[str] = ()) -> list[Path]:
             files.append(new / f"figure-view{f'-{field}' if field else ''}.html")
             try:
                 export_page(window(run, field), files[-1])
-            except ImportError as error:
+            except (ImportError, AttributeError) as error:  # missing, or of another version
                 raise InputError(
-                    "--html: packages of pyvista are missing; accepted: "
+                    f"--html: pyvista cannot export ({error}); accepted: "
                     'pip install "pyvista[jupyter]" first, or contact view',
                     "figure-option",
                 ) from error
