@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from contact import _compat
 from contact.mesh.cells import Shape, facet_with, rule, shape_of
-from contact.mesh.deviation import deviations
+from contact.mesh.deviation import SMOOTH, deviations
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices, cells_at
 from contact.mesh.geometry import (
@@ -117,8 +117,47 @@ class Surface:
         if self.order > 1:
             arcs = _of_arcs(self.shape, self.points, self.normal)
             deviation = np.zeros_like(deviation)
-            unknown, change = 0.5 * unknown + 2 * arcs, 0.5 * change + 6 * arcs
+            unknown, change = 0.5 * unknown + 2 * arcs, np.maximum(self._slope_errors(), 4 * arcs)
         return replace(self, deviation=deviation, unknown=unknown, change=change)
+
+    def _slope_errors(self) -> Array:
+        """Return c of a parabola with the errors of slopes of curved edges, (f, edges). Collective.
+
+        A smooth curve is off from the parabola through three of its points by less than another
+        one over the edge, of the length L, that has the error s of the slope at an end: c = s L.
+        With the jumps of normals n and curvatures K to the facets beside it s is
+
+            s = |n - n'| + |t.(K - K') t| L/12    (t along the edge).
+        """
+        shape, d, corners = self.shape, self.points.shape[2], self.shape.corners
+        ends = np.array(shape.edges)
+        gradients = shape.gradients(self.order, shape.nodes(self.order))
+        slopes = np.einsum("abr,fbd->fadr", gradients, self.points)
+        second = np.einsum("abs,fbdr->fadrs", gradients, slopes)[:, :corners]
+        slopes, names = slopes[:, :corners], self.nodes[:, :corners]
+        normal = self.normals(np.arange(self.count)[:, None], slopes)
+        dual = inverse(slopes.swapaxes(2, 3) @ slopes) @ slopes.swapaxes(2, 3)
+        curvature = np.einsum(
+            "fcd,fcdrs,fcra,fcsb->fcab", normal, second, dual, dual, optimize=True
+        )
+        one = np.ones((*names.shape, 1))
+        own = np.concatenate([normal, curvature.reshape(*names.shape, d * d), one], axis=2)
+        at, sums = self.owners.sums(names.ravel(), own.reshape(-1, own.shape[2]))
+        mean = self.owners.values(names.ravel(), lambda given: sums[np.searchsorted(at, given)])
+        mean = (mean / mean[:, -1:]).reshape(own.shape)
+        # Edges of the body are none of its surface: the cosine of half of the turn, squared.
+        smooth = np.einsum("fcd,fcd->fc", normal, mean[:, :, :d]) > SMOOTH**2
+        jump = 2 * np.where(smooth[:, :, None], own - mean, 0.0)[:, ends]
+        along = np.einsum(
+            "feidr,er->feid", slopes[:, ends], np.diff(shape.nodes(1)[ends], axis=1)[:, 0]
+        )
+        along /= np.linalg.norm(along, axis=3)[..., None]
+        bend = jump[..., d:-1].reshape(*along.shape, d)
+        bend = np.abs(np.einsum("feia,feiab,feib->fei", along, bend, along))
+        middle = self.points[:, corners : corners + len(ends), None]
+        length = np.linalg.norm(self.points[:, ends] - middle, axis=3).sum(axis=2)
+        error = np.linalg.norm(jump[..., :d], axis=3) + bend * length[:, :, None] / 12
+        return np.asarray(length * error.max(axis=2))
 
     @property
     def refined(self) -> bool:
