@@ -177,6 +177,37 @@ def test_irregular_bowls_that_touch_are_accepted(cell):
             check_refused(domain, depth)
 
 
+@pytest.mark.parallel
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_lenses_within_a_facet(element):
+    """Two arcs that no vertex of either lies in: less deep than both sagittas, facets are apart.
+
+    Gaps of degree 2 have the depth, or the warning of what is set to zero; curved cells refuse it.
+    """
+    order, degree = element
+    for counts in ((5, 5), (5, 7)):
+        sagittas = sum(1 / count**2 / 8 for count in counts)
+        for share in (0.1, 0.6, 1.2, 2.0):
+            depth = share * sagittas
+            domain = layers(COMM, "quadrilateral", order, "flat", 0.0, counts=counts)
+            x, second = domain.mesh.geometry.x, overlapping.of_layer(domain, 1)
+            rise = depth / 2 - 1 + np.sqrt(1 - (x[:, 1] - 0.5) ** 2)
+            x[:, 0] += np.where(second, -rise, rise)
+            given, contact = Body(Linear(YOUNG, POISSON), []), Contact("outer0", against="inner1")
+            if order == 2:
+                assert 0.7 * depth < told(domain, given, contact, degree) < depth
+            elif share > 1:
+                found = told(domain, given, contact, degree)
+                assert found == pytest.approx(depth - sagittas, rel=0.03)
+            else:
+                nodes = Problem(domain, given, contact, degree=degree).nodes
+                deepest = nodes.maximum(-nodes.gap, -1.0)
+                if degree == 1:
+                    assert nodes.cut == 0 and deepest < 0.95 * (depth - sagittas)
+                else:
+                    assert deepest + nodes.cut == pytest.approx(depth, rel=0.05)
+
+
 def check_refused(domain, depth, most=1.2):
     """Two layers are refused as a pair, and said to overlap without it, if there is a depth."""
     given = Body(Linear(YOUNG, POISSON), [])
