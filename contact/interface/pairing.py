@@ -22,6 +22,7 @@ from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, Geometry, contact_directions
 from contact.interface.overlaps import Depths
 from contact.interface.placing import check_gap
+from contact.mesh.deviation import SMOOTH
 from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle
@@ -157,7 +158,7 @@ def find_pair(
             "pair",
         )
     _check_apart(body, found, slave.owners, label)
-    _check_overlap(body, found, slave.owners, added, overlap, press, alone, label)
+    _check_overlap(body, found, (slave, master), added, overlap, press, alone, label)
     placement = PairPlacement(body, slave, master, reach, no_multiplier, found.nodes, added, press)
     return placement, placement.geometry(slave, master, found)
 
@@ -165,7 +166,7 @@ def find_pair(
 def _check_overlap(
     body: BodyEquilibrium,
     found: Coupling,
-    owners: Owners,
+    sides: tuple[Surface, Surface],
     added: Array,
     overlap: Depths,
     press: bool,
@@ -176,7 +177,7 @@ def _check_overlap(
 
     `alone`: partly covered facets without a neighbour that faces the master, shape (f,).
     """
-    rounding = TOUCHING * body.domain.size
+    rounding, owners = TOUCHING * body.domain.size, sides[0].owners
     least = body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
     depth, resolved = found.interference(owners, added)
     inside, beside = overlap
@@ -194,7 +195,16 @@ def _check_overlap(
             "two bodies whose meshes are apart",
             "pair",
         )
-    raise _overlap(depth, drawn, resolved, label)
+    raise _overlap(depth, drawn, resolved, label, drawn and any([_turns(side) for side in sides]))
+
+
+def _turns(side: Surface) -> bool:
+    """Return whether straight facets of a side turn as those of an edge of the body. Collective."""
+    corners = side.nodes[:, : side.shape.corners]
+    normal = np.pad(side.normal, ((0, 0), (0, 1)), constant_values=1.0)
+    _, sums = side.owners.sums(corners.ravel(), np.repeat(normal, corners.shape[1], axis=0))
+    turned = np.linalg.norm(sums[:, :-1], axis=1) <= SMOOTH * sums[:, -1]
+    return side.owners.comm.allreduce(bool(turned.any()) and side.order == 1, op=MPI.LOR)
 
 
 def _refuse_shared(slave: Surface, master: Surface, label: str) -> None:
@@ -306,7 +316,9 @@ def _check_rim(
         )
 
 
-def _overlap(depth: float, drawn: bool, resolved: bool, label: str) -> InputError:
+def _overlap(
+    depth: float, drawn: bool, resolved: bool, label: str, turns: bool = False
+) -> InputError:
     """Return the error of an overlap, drawn or by the gap, given whether nodes resolve it."""
     drawn_way = 'overlap = "press" (in Python press=True)'
     bodies, way = ("bodies", drawn_way) if drawn else ("bodies and the gap", "a gap below 0")
@@ -315,6 +327,11 @@ def _overlap(depth: float, drawn: bool, resolved: bool, label: str) -> InputErro
         way += (
             " of sides that face each other there, with on and against exchanged or with shorter "
             "facets of on"
+        )
+    if turns:
+        # The same vertices are those of a polygon, whose edges are in the other body.
+        way += (
+            "; of a curve whose facets turn by over 52 degrees, shorter or curved ones (mesh.order)"
         )
     return InputError(
         f"{label}: the undeformed {bodies} overlap, by up to {depth:.3g} more than facets "

@@ -151,6 +151,19 @@ def test_curved_cells_that_turn_are_accepted(cell):
 
 @pytest.mark.parallel
 @pytest.mark.parametrize("cell", PLANE)
+def test_a_coarse_tip_is_refused_with_the_way_out(cell):
+    """Its vertices may be those of a polygon, which overlaps; flat sides are told none of it."""
+    for axis in (0.5, 0.35):
+        domain = of_half_ellipses(cell, 1, axis, (4, 5), 0.0)
+        contact = Contact("outer0", against="inner1")
+        told(domain, Body(Linear(YOUNG, POISSON), []), contact, words="(mesh.order)")
+    with pytest.raises(InputError) as raised:
+        Problem(layers(COMM, cell, 1, "flat", 0.1), body("flat", 2, 2), contact)
+    assert "curve whose" not in str(raised.value)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("cell", PLANE)
 def test_steep_waves_of_curved_cells_are_accepted(cell):
     """Of up to three facets a period, where chords turn by a right angle."""
     for counts, periods in (((7, 4), 1), ((4, 13), 1), ((8, 20), 2)):
