@@ -11,11 +11,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import basix.ufl
 import numpy as np
-import ufl
 from dolfinx import fem
-from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact import Body, Contact, Domain, Fixed, NewtonOptions, Sphere
@@ -32,6 +29,7 @@ from scripts.studies.error_norms import DualNorm, errors
 from scripts.studies.exact_solutions import Singular
 from scripts.studies.hertz_exact import Line, Point
 from scripts.studies.lame_rings import Lame, rings
+from tests.problems.meshes import assembled, midpoints
 
 #: Geometry and displacements: their degrees.
 ELEMENTS = ((1, 1), (1, 2), (2, 2))
@@ -85,14 +83,9 @@ def grid(
     make, name = (rectangle, "rectangle") if d == 2 else (box, "box")
     regular = make(MPI.COMM_SELF, (0.0,) * d, (1.0,) * d, (n,) * d, cell=cell).mesh
     space = fem.functionspace(regular, ("Lagrange", order))
-    last = None if comm.rank == 0 else 0
-    x = space.tabulate_dof_coordinates()[:last, :d]
-    cells = space.dofmap.list[:last].astype(np.int64)
-    element = basix.ufl.element("Lagrange", cell, order, shape=(d,), dtype=np.float64)
-    mesh = dmesh.create_mesh(comm, cells=cells, x=x, e=ufl.Mesh(element))
-    mesh.topology.create_connectivity(d - 1, d)
-    facets = dmesh.exterior_facet_indices(mesh.topology)
-    middle = dmesh.compute_midpoints(mesh, d - 1, facets)
+    points, cells = space.tabulate_dof_coordinates()[:, :d], space.dofmap.list
+    mesh = assembled(comm, points, cells, cell, order)
+    facets, middle, *_ = midpoints(mesh)
     parts = {
         side: facets[np.abs(middle[:, axis] - end) < 1e-9]
         for side, (axis, end) in SIDES[name].items()

@@ -6,17 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import box, rectangle
 from contact.typing import Array
+from tests.problems.meshes import assembled, midpoints
 
 #: Cells around a ring and across it for each on the other way.
 AROUND = 2
@@ -82,19 +81,9 @@ def rings(
         places.append(x)
         rows.append(space.dofmap.list + count)
         count += len(x)
-    element = basix.ufl.element("Lagrange", cell, order, shape=(d,), dtype=np.float64)
-    first = comm.rank == 0
-    cells_here = np.concatenate(rows).astype(np.int64)[: None if first else 0]
-    x = np.concatenate(places)[: None if first else 0]
-    mesh = dmesh.create_mesh(comm, cells=cells_here, x=x, e=ufl.Mesh(element))
-    mesh.topology.create_connectivity(d - 1, d)
-    facets = dmesh.exterior_facet_indices(mesh.topology)
-    to_cell = mesh.topology.connectivity(d - 1, d)
-    behind = dmesh.compute_midpoints(mesh, d, to_cell.array[to_cell.offsets[facets]])
-    middle = dmesh.compute_midpoints(mesh, d - 1, facets)
-    every = np.arange(mesh.topology.index_map(d).size_local, dtype=np.int32)
-    centre = np.linalg.norm(dmesh.compute_midpoints(mesh, d, every)[:, :2], axis=1)
-    inside, at = (np.linalg.norm(x[:, :2], axis=1) for x in (behind, middle))
+    mesh = assembled(comm, np.concatenate(places), np.concatenate(rows), cell, order)
+    facets, middle, behind, every = midpoints(mesh)
+    centre, inside, at = (np.linalg.norm(x[:, :2], axis=1) for x in (every, behind, middle))
     flat = {"left": 0, "bottom": 1, "front": 2}
     sides = {name: np.abs(middle[:, k]) < 1e-9 for name, k in flat.items() if k < d}
     if d == 3:
@@ -106,7 +95,7 @@ def rings(
         own = round_ & (inside > low * 0.95) & (inside < high)
         sides[f"inner{k}"] = own & (at < inside)
         sides[f"outer{k}"] = own & (at > inside)
-        regions[f"ring{k}"] = every[(centre > low * 0.95) & (centre < high)]
+        regions[f"ring{k}"] = np.flatnonzero((centre > low * 0.95) & (centre < high))
     parts = {name: facets[chosen] for name, chosen in sides.items()}
     return from_mesh(mesh, parts, radii[-1], regions)
 

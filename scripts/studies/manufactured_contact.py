@@ -23,6 +23,7 @@ from forms.laws import ConstantCoefficient, PerfectConductivity
 from forms.ops import positive_part
 from forms.piezo import Piezo
 from scripts.studies.exact_solutions import interpolated
+from tests.problems.meshes import assembled, midpoints
 
 #: A UFL expression, or a number.
 Value: TypeAlias = Any
@@ -164,34 +165,20 @@ class Sliding:
             grid = make(MPI.COMM_SELF, corners, [number] * d, cell_type=kind)
             cells.append(geometry_dofmap(grid) + sum(map(len, points)))
             points.append(grid.geometry.x[:, :d])
-        comm = MPI.COMM_WORLD
-        mine = slice(None if comm.rank == 0 else 0)
-        element = basix.ufl.element("Lagrange", cell, 1, shape=(d,), dtype=np.float64)
-        mesh = dmesh.create_mesh(
-            comm,
-            cells=np.concatenate(cells)[mine].astype(np.int64),
-            x=np.concatenate(points)[mine],
-            e=ufl.Mesh(element),
-        )
-        mesh.topology.create_connectivity(d - 1, d)
-        to_cell = mesh.topology.connectivity(d - 1, d)
-        facets = dmesh.exterior_facet_indices(mesh.topology)
-        middle = dmesh.compute_midpoints(mesh, d - 1, facets)
-        behind = dmesh.compute_midpoints(mesh, d, to_cell.array[to_cell.offsets[facets]])
-        upper = behind[:, d - 1] > 0
+        mesh = assembled(MPI.COMM_WORLD, np.concatenate(points), np.concatenate(cells), cell)
+        facets, middle, behind, centre = midpoints(mesh)
 
         def at(axis: int, value: float) -> Any:
             return np.abs(middle[:, axis] - value) < 1e-9
 
         where = {side: at(axis, max(sign, 0.0)) for side, axis, sign in SIDES[: 2 * (d - 1)]}
-        where |= {"contact0": upper & at(d - 1, 0.0), "far0": at(d - 1, 1.0)}
-        where |= {"contact1": ~upper & at(d - 1, 0.0), "far1": at(d - 1, -1.0)}
-        every = np.arange(mesh.topology.index_map(d).size_local, dtype=np.int32)
-        high = dmesh.compute_midpoints(mesh, d, every)[:, d - 1] > 0
-        regions = {"block0": every[high], "block1": every[~high]}
+        regions = {}
+        for k in range(len(self.laws)):
+            up = 1 - 2 * k
+            where[f"contact{k}"] = (up * behind[:, -1] > 0) & at(d - 1, 0.0)
+            where[f"far{k}"] = at(d - 1, up)
+            regions[f"block{k}"] = np.flatnonzero(up * centre[:, -1] > 0)
         parts = {name: facets[chosen] for name, chosen in where.items()}
-        if len(self.laws) == 1:
-            del parts["contact1"], parts["far1"], regions["block1"]
         return from_mesh(mesh, parts, regions=regions)
 
 

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import basix.ufl
 import numpy as np
-from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.mesh.domain import Domain, from_mesh
@@ -28,6 +26,7 @@ from scripts.studies.robustness.one_body import (
     plane,
     sliding,
 )
+from tests.problems.meshes import assembled
 
 #: Tables, and the mesh in place of theirs.
 Drawn = tuple[Tables, Domain | None]
@@ -130,8 +129,7 @@ def stack(rng: Rng) -> Drawn:
     points = np.array([[a, r] for row in rows for r in row for a in across])
     corner = np.array([i + j * (cells + 1) for j in (0, 1, 3, 4) for i in range(cells)])
     corners = np.array([0, 1, cells + 1, cells + 2])
-    element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,))
-    mesh = dmesh.create_mesh(MPI.COMM_SELF, corner[:, None] + corners, points, element)
+    mesh = assembled(MPI.COMM_SELF, points, corner[:, None] + corners, "quadrilateral")
     places = {"bottom": 0.0, "inner": thick[0], "outer": apart, "top": apart + thick[1]}
     parts = {name: lambda x, r=r: np.isclose(x[1], r) for name, r in places.items()}
     regions = {"lower": lambda x: x[1] < apart / 2, "upper": lambda x: x[1] > apart / 2}
