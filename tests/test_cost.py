@@ -68,7 +68,6 @@ from tests.problems.rings import between_plates, squeezed
 from tests.problems.shaken import shaken, times
 from tests.verification.test_piezo_examples import example, first_solve
 from tests.verification.test_punch import SUNK, TILTED, punched
-from tests.verification.test_quadratic_space import quadratic
 
 COMM = MPI.COMM_WORLD
 CASE = -0.05, 1e5, "friction.mu=0.5"
@@ -162,7 +161,7 @@ def jaws(weight: float) -> Counted:
 def indenter(dim: int, n: int, *, degree: int = 1, **last: float | str) -> Counted:
     """Indent a block by a ball, whose motion or force along the last axis is given."""
     rigid = {name: [*[0.0] * (dim - 1), value] for name, value in last.items()}
-    return of_case(quadratic(n, **rigid) if degree == 2 else indented(dim, n, **rigid), **EXACT)
+    return of_case(indented(dim, n, degree, **rigid), **EXACT)
 
 
 def bolted(_: Path) -> Counters:

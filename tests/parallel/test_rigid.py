@@ -47,6 +47,5 @@ def test_plates_and_electrodes_move_alike(make, condense):
 @pytest.mark.core
 @pytest.mark.parametrize(("degree", "condense"), [(1, False), (2, True), (2, False)])
 def test_a_ball_in_space_moves_alike(degree, condense):
-    ball = indented(3, 3, displacement=[0.0, 0.0, "free"], force=[0.0, 0.0, -0.02])
-    case = ball.model_copy(update={"space": ball.space.model_copy(update={"degree": degree})})
+    case = indented(3, 3, degree, displacement=[0.0, 0.0, "free"], force=[0.0, 0.0, -0.02])
     alike(case, NewtonOptions(tolerance=1e-10, condense=condense), 1e-7)

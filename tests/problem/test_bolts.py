@@ -24,6 +24,7 @@ from contact.mesh.domain import from_mesh
 from contact.methods.options import NewtonOptions
 from contact.problem.checks import check_problem
 from contact.results.fields import DerivedFields
+from tests.problems.mechanics import at_points
 from tests.problems.meshes import assembled, midpoints
 
 COMM = MPI.COMM_WORLD
@@ -70,17 +71,10 @@ def test_a_bar_between_walls(given, dim, degree, linear):
     found = solution.movements["bolts"]["cut"]
     assert found == {"shortening": pytest.approx(s), "force": pytest.approx(force)}
     assert solution.reaction("bottom")[dim - 1] == pytest.approx(-force, rel=1e-8)
-    assert np.allclose(stresses(solution)[:, dim - 1, dim - 1], force / area, rtol=1e-7, atol=0)
+    stress = at_points(solution, "stress")[:, dim - 1, dim - 1]
+    assert np.allclose(stress, force / area, rtol=1e-7, atol=0)
     energy = solution.energies
     assert energy is None or energy.energy == pytest.approx(force * s / 2, rel=1e-8)
-
-
-def stresses(solution):
-    """Return the stresses at points of the owned cells, shape (n, 3, 3)."""
-    fields = DerivedFields(solution.problem.body, solution.state)
-    rows = [values.reshape(-1, values.shape[-1]) for _, values in fields.chunks()]
-    every = np.concatenate(rows) if rows else np.zeros((0, 40))
-    return every[:, fields.columns["stress"]].reshape(-1, 3, 3)
 
 
 #: Widths of the bolt and of the flanges, heights of these, Young's moduli of all.
@@ -270,7 +264,7 @@ def test_cuts_that_cross_make_four_pieces():
     held.append({"on": "left", "displacement": [0.0, "free"]})
     bolts = {"force": 0.02}, {"force": -0.05}, "abs(x - 0.2) < 1e-6"
     solution = solve(two(*bolts, fixed=held, contact={"on": "right"}), comm=COMM)
-    stress = stresses(solution)
+    stress = at_points(solution, "stress")
     assert np.allclose(stress[:, 1, 1], 0.02 / 0.4) and np.allclose(stress[:, 0, 0], -0.05 / LENGTH)
     free = two(*bolts, fixed=held[::2], contact={"on": "top"})
     with pytest.raises(InputError, match=r"\[unsupported\]"):

@@ -5,60 +5,13 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, parse_case
-from contact.body.description import Body
 from contact.errors import InputError
-from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.friction import Friction
-from contact.problem.checks import check_rigid_modes
-from contact.problem.problem import ContactProblem
-from forms.hencky import Linear
-from forms.laws import ConstantCoefficient
 from scripts.force_balance import force_balance
-from tests.problems.blocks import Blocks
-from tests.problems.mechanics import constant, flat
+from tests.problems.mechanics import newton
 from tests.problems.pairs import case
 from tests.problems.written import block
 
 SELF = MPI.COMM_SELF
-
-
-def blocks(held, traction, mu=0.0):
-    """Return two blocks, the lower one held as said, the upper one loaded and on it alone."""
-    fixed = [Fixed("bottom", [None if c is None else constant(c, 2) for c in held])]
-    load = Load("top", [constant(f, 2) for f in traction])
-    body = Body(Linear(1.0, 0.3), fixed, (load,))
-    friction = Friction(ConstantCoefficient(mu)) if mu else None
-    contact = Contact("under", flat(), friction=friction, against="over")
-    return ContactProblem(Blocks().domain(SELF), body, contact)
-
-
-@pytest.mark.parametrize("condense", [True, False])
-def test_a_body_that_lies_on_another_is_held_by_friction(condense):
-    problem = blocks((0.0, 0.0), (0.001, -0.01), mu=0.5)
-    check_rigid_modes(problem)
-    method = Newton(problem, NewtonOptions(tolerance=1e-9, condense=condense))
-    state, outcome = method.solve()
-    assert outcome.converged
-    balance = force_balance(problem, state)
-    assert balance.applied == pytest.approx([0.001, -0.01], rel=1e-10)
-    assert balance.supports == pytest.approx([-0.001, 0.01], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("held", "traction", "mu", "words"),
-    [
-        ((0.0, 0.0), (0.0, -0.01), 0.0, r"\[unsupported\]"),
-        ((None, 0.0), (0.0, -0.01), 0.5, r"\[unsupported\]"),
-        ((0.0, 0.0), (0.0, 0.01), 0.5, r"\[pulled-off\]"),
-        ((0.0, 0.0), (0.01, -0.01), 0.5, r"\[pulled-off\]"),
-    ],
-)
-def test_pairs_that_fly_away_are_refused(held, traction, mu, words):
-    with pytest.raises(InputError, match=words):
-        check_rigid_modes(blocks(held, traction, mu))
 
 
 @pytest.mark.parametrize(
@@ -96,10 +49,8 @@ def stack(push, mu=0.3, method="newton"):
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
 def test_a_stack_that_nothing_but_contact_holds(linear):
     problem = stack(0.2)
-    options = NewtonOptions(linear=linear, condense=linear == "lu")
-    state, outcome = Newton(problem, options).solve()
-    assert outcome.converged, outcome.reason
-    balance = force_balance(problem, state)
+    method = newton(problem, tolerance=1e-8, linear=linear, condense=linear == "lu")
+    balance = force_balance(problem, method.state)
     assert balance.applied == pytest.approx([0.4, -2.0], rel=1e-10)
     assert balance.contact == pytest.approx([-0.4, 2.0], rel=1e-6)
 

@@ -15,7 +15,6 @@ from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
-from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed
 from contact.model.contact import Contact
@@ -28,11 +27,11 @@ from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
 from contact.results.resultants import movements
 from contact.solving import build_problem, solve
-from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks
-from tests.problems.mechanics import constant, flat
+from tests.problems.mechanics import constant, flat, state_of
+from tests.problems.mechanics import solve as relax
 from tests.problems.rigid import indented, plate, solved
 
 SELF = MPI.COMM_SELF
@@ -41,17 +40,17 @@ SELF = MPI.COMM_SELF
 FREE = {"displacement": [0.05, "free"], "force": [0.0, -0.01], "rotation": "free"}
 
 
-@pytest.mark.core
-@pytest.mark.parametrize("dim", [2, 3])
-def test_force_and_displacement_control_agree(dim):
-    n = 10 if dim == 2 else 4
+@pytest.mark.core("2-1-10", "3-1-4")
+@pytest.mark.parametrize(("dim", "degree", "n"), [(2, 1, 10), (3, 1, 4), (3, 2, 2)])
+def test_force_and_displacement_control_agree(dim, degree, n):
     still = [0.0] * (dim - 1)
-    forced, moved = solved(
-        indented(dim, n, displacement=[*still, "free"], force=[*still, -0.01]), SELF
-    )
+    case = indented(dim, n, degree, displacement=[*still, "free"], force=[*still, -0.01])
+    forced, moved = solved(case, SELF)
+    _, same = solved(case, SELF, NewtonOptions(tolerance=1e-10, condense=False, linear="lu"))
     depth = moved["rigid"]["displacement"][-1]
+    assert same["rigid"]["displacement"][-1] == pytest.approx(depth, rel=1e-9)
     assert depth < -0.005
-    driven, held = solved(indented(dim, n, displacement=[*still, depth]), SELF)
+    driven, held = solved(indented(dim, n, degree, displacement=[*still, depth]), SELF)
     assert held["rigid"]["force"][-1] == pytest.approx(-0.01, rel=1e-10)
     scale = np.abs(driven.state.x).max()
     assert np.allclose(forced.state.x, driven.state.x, rtol=0, atol=1e-10 * scale)
@@ -122,8 +121,7 @@ def test_all_methods_find_the_same_motion(solver, tolerance, law):
 def test_residuals_see_an_indenter_out_of_balance():
     case = indented(displacement=[0.0, "free"], force=[0.0, -0.01])
     problem = build_problem(case, SELF)
-    state, outcome = Newton(problem, NewtonOptions()).solve()
-    assert outcome.converged
+    state = state_of(problem, 1e-8)
     less = Multipliers(0.9 * state.forces.contact, 0.9 * state.forces.friction)
     residual = residual_forces(problem, State(state.x, less))
     q = problem.body.motion(problem.body.unbalanced(residual))
@@ -289,11 +287,9 @@ def test_a_free_plate_loads_two_bodies(how):
     problem = stacked()
     check_rigid_modes(problem)
     if how == "uzawa":
-        method = FixedPoint(problem, FixedPointOptions(tolerance=1e-10))
+        state = relax(problem, 1e-10).state
     else:
-        method = Newton(problem, NewtonOptions(tolerance=1e-10, condense=how == "condensed"))
-    state, outcome = method.solve()
-    assert outcome.converged
+        state = state_of(problem, 1e-10, condense=how == "condensed")
     nodes = problem.nodes
     stress = problem.interface.stress(problem.nodal(state), state.forces)
     force = nodes.weight[:, None] * stress
@@ -304,7 +300,6 @@ def test_a_free_plate_loads_two_bodies(how):
     assert moment == pytest.approx(0.001, rel=1e-9)
     # The same motion by all methods: that of the condensed one.
     plate = movements(problem, state)["rigid_parts"]["top"]
-    exact, _ = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
-    expected = movements(problem, exact)["rigid_parts"]["top"]
+    expected = movements(problem, state_of(problem, 1e-11))["rigid_parts"]["top"]
     for key in ("displacement", "rotation"):
         assert plate[key] == pytest.approx(expected[key], rel=1e-6), key

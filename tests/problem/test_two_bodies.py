@@ -10,8 +10,7 @@ from contact import parse_case, solve
 from contact.body.description import Body
 from contact.errors import InputError, SingularError
 from contact.linear.operator import SparseOperator
-from contact.methods.method import METHODS
-from contact.methods.options import OPTIONS
+from contact.methods.options import PenaltyOptions
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
@@ -20,11 +19,13 @@ from contact.model.obstacle import GapFunction
 from contact.problem.checks import check_rigid_modes
 from contact.problem.problem import ContactProblem
 from contact.results.contact_nodes import contact_table
+from contact.thesis.penalty import Penalty
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks
 from tests.problems.everywhere import agree, at_all, pressures
-from tests.problems.mechanics import constant
+from tests.problems.mechanics import constant, solved_by, state_of
+from tests.problems.mechanics import solve as relax
 from tests.problems.pairs import case
 
 COMM = MPI.COMM_WORLD
@@ -72,30 +73,20 @@ def test_another_geometry_or_interface_has_its_own_constraint():
 @pytest.mark.parametrize("degree", [1, 2])
 def test_methods_agree(degree):
     problem = pushed(MPI.COMM_SELF, degree)
-    found = {}
-    for name in ("newton", "uzawa"):
-        state, outcome = METHODS[name](problem, OPTIONS[name](tolerance=1e-11), None).solve()
-        assert outcome.converged, (name, outcome)
-        found[name] = state.x
-    size = np.abs(found["newton"]).max()
-    np.testing.assert_allclose(found["uzawa"], found["newton"], rtol=0, atol=1e-8 * size)
-    sparse = OPTIONS["newton"](tolerance=1e-11, condense=False)
-    state, outcome = METHODS["newton"](problem, sparse, None).solve()
-    assert outcome.converged
-    np.testing.assert_allclose(state.x, found["newton"], rtol=0, atol=1e-9 * size)
+    dense, sparse = (state_of(problem, 1e-11, condense).x for condense in (True, False))
+    relaxed, size = relax(problem, 1e-11).state.x, np.abs(dense).max()
+    np.testing.assert_allclose(relaxed, dense, rtol=0, atol=1e-8 * size)
+    np.testing.assert_allclose(sparse, dense, rtol=0, atol=1e-9 * size)
 
 
 @pytest.mark.core
 def test_penalty_comes_near():
     problem = pushed(MPI.COMM_SELF, supports=[Fixed("upper_left", [ZERO, None])])
-    exact, outcome = METHODS["newton"](problem, OPTIONS["newton"](tolerance=1e-11), None).solve()
-    assert outcome.converged
-    errors = []
+    exact, errors = state_of(problem, 1e-11).x, []
     for eps in (2e-2, 1e-2):
-        options = OPTIONS["penalty"](tolerance=1e-9, eps_contact=eps, eps_slip=eps * 1e-2)
-        state, outcome = METHODS["penalty"](problem, options, None).solve()
-        assert outcome.converged
-        errors.append(np.abs(state.x - exact.x).max() / np.abs(exact.x).max())
+        options = PenaltyOptions(tolerance=1e-9, eps_contact=eps, eps_slip=eps * 1e-2)
+        x = solved_by(problem, options).state.x
+        errors.append(np.abs(x - exact).max() / np.abs(exact).max())
     assert errors[0] < 0.1 and errors[1] == pytest.approx(errors[0] / 2, rel=0.2)
 
 
@@ -104,16 +95,13 @@ def test_penalty_comes_near():
 def test_penalties_find_what_friction_alone_holds(degree, gap):
     """At rest nothing presses: without friction the upper block would fly away."""
     problem = pushed(MPI.COMM_SELF, degree, gap=gap)
-    exact, outcome = METHODS["newton"](problem, OPTIONS["newton"](tolerance=1e-11), None).solve()
-    assert outcome.converged
-    state, outcome = METHODS["penalty"](problem, OPTIONS["penalty"](), None).solve()
-    assert outcome.converged, outcome.ended
-    assert np.abs(state.x - exact.x).max() < 0.02 * np.abs(exact.x).max()
+    exact, near = state_of(problem, 1e-11).x, solved_by(problem, PenaltyOptions()).state.x
+    assert np.abs(near - exact).max() < 0.02 * np.abs(exact).max()
 
 
 def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
     """It was held at rest: that it is lost on the way is no fault of the input."""
-    method = METHODS["penalty"](pushed(MPI.COMM_SELF), OPTIONS["penalty"](), None)
+    method = Penalty(pushed(MPI.COMM_SELF), PenaltyOptions())
     solve, calls = SparseOperator.solve, []
 
     def singular(operator, *given):
@@ -132,12 +120,8 @@ def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
 @pytest.mark.parametrize("condense", [True, False])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_ranks_agree(dim, condense):
-    options = OPTIONS["newton"](tolerance=1e-12, condense=condense)
-
     def quantities(problem):
-        state, outcome = METHODS["newton"](problem, options, None).solve()
-        assert outcome.converged
-        nodes = problem.nodes
+        nodes, state = problem.nodes, state_of(problem, 1e-12, condense)
         values = {"points": nodes.points, "forces": state.forces.vectors(nodes)}
         return {name: at_all(nodes.comm, nodes.points, x) for name, x in values.items()}
 
@@ -168,6 +152,9 @@ def test_a_body_may_be_held_by_contact_alone(pair):
         check_rigid_modes(held([clamped, guided], PULL, pair=pair))
     with pytest.raises(InputError, match=r"\[unsupported\]"):
         check_rigid_modes(held([guided], PRESS, mu=0.0, pair=pair))
+    # Both of them together, along the rollers of the lower one.
+    with pytest.raises(InputError, match=r"\[unsupported\]"):
+        check_rigid_modes(held([Fixed("bottom", [None, ZERO])], PRESS, mu=0.5, pair=pair))
 
 
 @pytest.mark.core

@@ -13,8 +13,9 @@ from contact.case.file import Case
 from contact.history import History
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
+from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
-from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.options import FixedPointOptions, NewtonOptions, Options
 from contact.methods.report import Outcome
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
@@ -22,6 +23,8 @@ from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Plane
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.results.fields import DerivedFields
+from contact.results.solution import Solution
 from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
@@ -213,12 +216,23 @@ def attempt(problem: ContactProblem, **options) -> tuple[FixedPoint, Outcome]:
     return loop, loop.solve()[1]
 
 
-def newton(problem: ContactProblem, **options) -> Newton:
-    """Solve by Newton's method and insist on convergence."""
-    method = Newton(problem, NewtonOptions(**{"tolerance": 1e-10, **options}))
+def solved_by(problem: ContactProblem, options: Options) -> Method:
+    """Solve by the method of some options and insist on convergence."""
+    method = METHODS[options.method](problem, options, None)
     _, outcome = method.solve()
     assert outcome.converged, outcome
     return method
+
+
+def newton(problem: ContactProblem, **options) -> Newton:
+    """Solve by Newton's method and insist on convergence."""
+    return solved_by(problem, NewtonOptions(**{"tolerance": 1e-10, **options}))
+
+
+def hooke(law: Hencky, strain: Array) -> Array:
+    """Return the stress of a linear law, shape (d, d)."""
+    mean = (law.bulk - 2 * law.shear / 3) * np.trace(strain)
+    return mean * np.eye(len(strain)) + 2 * law.shear * strain
 
 
 def bar_case(n: int, *changes: str) -> Case:
@@ -230,6 +244,13 @@ def bar_case(n: int, *changes: str) -> Case:
 def state_of(problem: ContactProblem, tolerance: float = 1e-13, condense: bool = True) -> State:
     """Return the state that Newton's method finds."""
     return newton(problem, tolerance=tolerance, condense=condense).state
+
+
+def at_points(solution: Solution, name: str) -> Array:
+    """Return stresses or strains at points of the owned cells, shape (n, 3, 3)."""
+    fields = DerivedFields(solution.problem.body, solution.state)
+    chunks = [values[..., fields.columns[name]].reshape(-1, 3, 3) for _, values in fields.chunks()]
+    return np.concatenate([np.zeros((0, 3, 3)), *chunks])
 
 
 def contact_data(loop: FixedPoint) -> dict[str, Array]:

@@ -14,7 +14,7 @@ from contact.solving import solve
 PIEZO = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
 
 
-def indented(dim: int = 2, n: int = 12, **rigid: Any) -> Case:
+def indented(dim: int = 2, n: int = 12, degree: int = 1, **rigid: Any) -> Case:
     """Return a block, 2 wide and 1 high, with a ball of radius 1 on it."""
     middle = [1.0] * (dim - 1)
     data: dict[str, Any] = {
@@ -24,6 +24,7 @@ def indented(dim: int = 2, n: int = 12, **rigid: Any) -> Case:
             "size": [2.0] * (dim - 1) + [1.0],
             "cells": [2 * n] * (dim - 1) + [n],
         },
+        "space": {"degree": degree},
         "material": {"young": 1.0, "poisson": 0.3},
         "fixed": [{"on": "bottom", "displacement": [0.0] * dim}],
         "contact": {

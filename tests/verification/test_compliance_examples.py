@@ -91,18 +91,6 @@ def test_layer_without_stiffness_is_signorini(name, method):
     assert np.allclose(a.pressure, b.pressure, rtol=0, atol=1e-10)
 
 
-def test_stiff_layer_tends_to_signorini_at_its_touch():
-    # Unlimited depth, touched at 0.5; the rigid part is far away.
-    far = ("contact.gap=1.5", "contact.layer=1.0", "contact.limit=10.0")
-    rigid = solved("8-3", 24).state.x
-    errors = [
-        np.linalg.norm(solved("8-3-layer", 24, *far, f"contact.stiffness={c}").state.x - rigid)
-        for c in (1e4, 1e5, 1e6)
-    ]
-    assert errors[2] < 1e-4 * np.linalg.norm(rigid)
-    assert np.allclose(np.log10(np.array(errors[:-1]) / errors[1:]), 1.0, atol=0.05)
-
-
 @pytest.mark.core
 @pytest.mark.parametrize("method", ["uzawa", "newton"])
 def test_normal_compliance_without_rigid_part(method):

@@ -9,22 +9,13 @@ import numpy as np
 import pytest
 
 from contact.history import BodyState
-from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
 from contact.results.fields import DerivedFields
 from forms.hencky import Linear, Log
 from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import HENCKY, Singular, exact, manufactured
 from scripts.studies.manufactured_contact import PiezoLayers, Sliding
+from tests.problems.mechanics import state_of
 from tests.problems.piezo import SCALED, potential, pzt
-
-
-def solve(problem):
-    loop = Newton(problem, NewtonOptions(tolerance=1e-10))
-    _, outcome = loop.solve()
-    assert outcome.converged, outcome.reason
-    return loop
-
 
 CASES = [(2, 1, (8, 16, 32)), (2, 2, (4, 8, 16)), (3, 1, (3, 6, 12)), (3, 2, (2, 4, 8))]
 
@@ -35,7 +26,7 @@ def test_hencky_orders(dim, degree, cells):
     found = []
     for n in cells:
         problem = manufactured(dim, degree, n)
-        x = solve(problem).state.x
+        x = state_of(problem, 1e-10).x
         e = errors(problem.body, x, exact(dim))
         found.append((e.h1, e.energy, e.l2))
     strains = DerivedFields(problem.body, BodyState(x)).cells()["dev_strain"].x.array
@@ -51,12 +42,11 @@ def test_hencky_orders(dim, degree, cells):
 def test_signorini_pressure():
     solution = Singular()
     problem = solution.problem(64)
-    loop = solve(problem)
-    nodes = problem.nodes
-    error = loop.state.forces.contact - solution.pressure(nodes.points[:, 0])
+    nodes, forces = problem.nodes, state_of(problem, 1e-10).forces
+    error = forces.contact - solution.pressure(nodes.points[:, 0])
     # The pressure is one of a corner, where Dirichlet data meet contact, and is left out there.
     inner = nodes.points[:, 0] < 0.9
-    assert nodes.norm(error * inner) < 0.05 * nodes.norm(loop.state.forces.contact)
+    assert nodes.norm(error * inner) < 0.05 * nodes.norm(forces.contact)
 
 
 ONE, OTHER = Linear(1.0, 0.3), Linear(3.0, 0.2)
@@ -68,19 +58,13 @@ BLOCKS = {
 }
 
 
-def solved(problem):
-    state, outcome = Newton(problem, NewtonOptions(tolerance=1e-10)).solve()
-    assert outcome.converged, outcome.reason
-    return state
-
-
 @pytest.mark.parametrize(("degree", "cells"), [(1, (32, 64)), (2, (8, 16))])
 @pytest.mark.parametrize("name", BLOCKS)
 def test_orders_of_sliding_blocks(name, degree, cells):
     block, found = BLOCKS[name], []
     for n in cells:
         problem = block.problem(n, degree)
-        state = solved(problem)
+        state = state_of(problem, 1e-10)
         u = block.exact(problem.domain)
         e = errors(problem.body, state.x, lambda _, u=u: u)
         found.append((e.energy, e.l2))
@@ -99,7 +83,7 @@ def test_pressures_friction_and_slip(dim, cells, most, order, laws):
     block, every = Sliding(laws, dim), []
     for n in cells:
         problem = block.problem(n, 2)
-        state = solved(problem)
+        state = state_of(problem, 1e-10)
         nodes, x = problem.nodes, problem.nodes.points.T
         slip = problem.interface.slip(problem.nodal(state))
         along = np.append([1.0] if dim == 2 else [np.cos(block.ANGLE), np.sin(block.ANGLE)], 0.0)
@@ -122,7 +106,7 @@ def test_layers_with_current():
     found = []
     for n in (8, 16):
         problem = layers.problem(n, 1)
-        state = solved(problem)
+        state = state_of(problem, 1e-10)
         pressure = state.forces.contact[1:-1]
         assert pressure == pytest.approx(layers.PRESSURE * layers.law.young, rel=0.02)
         assert problem.interface.slip_length(problem.nodal(state)) == pytest.approx(layers.SLIP)

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from contact import Body, Contact, Domain, Fixed, Friction, GapFunction, Load, Material, from_file
+from contact.interface.nodes import ContactNodes
 from contact.mesh.cells import Shape
 from contact.mesh.domain import revolved
 from contact.problem.problem import ContactProblem
@@ -21,7 +22,7 @@ from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from scripts.force_balance import force_balance
 from tests.problems.blocks import Blocks, squares, write_unlike
-from tests.problems.mechanics import constant, state_of
+from tests.problems.mechanics import Affine, constant, hooke, state_of
 
 COMM = MPI.COMM_WORLD
 KINDS = [
@@ -39,19 +40,6 @@ CURVED = [cell for _, degree, cell in KINDS if degree == 2]
 SIDES = {2: ("left", "right"), 3: ("left", "right", "front", "back")}
 ROLLERS = {dim: (("bottom", dim - 1), ("left", 0), ("front", 1))[:dim] for dim in (2, 3)}
 NOTHING = GapFunction(lambda points: np.zeros(len(points)))
-
-
-class Linearly:
-    """One component of A x as a given displacement."""
-
-    def __init__(self, row: Array) -> None:
-        self._row = row
-
-    def numpy(self, points: Array) -> Array:
-        return points @ self._row
-
-    def ufl(self, x):
-        return sum(float(a) * x[i] for i, a in enumerate(self._row))
 
 
 def constants(values: Array) -> list:
@@ -82,8 +70,11 @@ def check_constant_pressure(
     pair: Sequence[str],
     dense: bool,
     stiff: float = 100.0,
-) -> None:
-    """Check that the pressure is that on top, for a lower block that is `stiff` times as stiff."""
+) -> tuple[ContactNodes, Array]:
+    """Check that the pressure is that on top, for a lower block that is `stiff` times as stiff.
+
+    Return the contact nodes, and the stresses in the cells, shape (n, 9).
+    """
     dim = domain.dim
     zero = constant(0.0, dim)
     fixed = [
@@ -100,6 +91,7 @@ def check_constant_pressure(
     k = 4 * (dim - 1)
     np.testing.assert_allclose(stress[:, k], -0.01, rtol=1e-10)
     assert force_balance(problem, state).imbalance < 1e-12
+    return problem.nodes, stress
 
 
 @pytest.mark.core
@@ -153,17 +145,8 @@ def test_constant_pressure_of_unlike_cells(dim: int, shared_tmp_path: Path) -> N
 def test_constant_pressure_on_discs(degree: int, pair: Sequence[str]) -> None:
     """Two discs about an axis: the pressure and sigma_zz are constant, rings and axis alike."""
     domain = revolved(blocks(2, grading=1.4).domain(COMM))
-    zero = constant(0.0, 2)
-    laws = {"upper": Linear(1.0, 0.3), "lower": Linear(7.0, 0.2)}
-    materials = [Material(law, on=(name,)) for name, law in laws.items()]
-    fixed, load = [Fixed("bottom", [None, zero])], Load("top", pressure=constant(0.01, 2))
-    body = Body(materials, fixed, [load])
-    problem = ContactProblem(domain, body, contact(*pair), degree=degree)
-    state = state_of(problem)
-    np.testing.assert_allclose(state.forces.contact, 0.01, rtol=1e-11)
-    assert problem.nodes.sum(np.ones(problem.nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
-    stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
-    np.testing.assert_allclose(stress[:, 4], -0.01, rtol=1e-9)
+    nodes, stress = check_constant_pressure(domain, [("bottom", 1)], degree, pair, True, 7.0)
+    assert nodes.sum(np.ones(nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
     np.testing.assert_allclose(np.delete(stress, 4, axis=1), 0, atol=1e-11)
 
 
@@ -200,12 +183,11 @@ def strain_of(given: Blocks) -> Array:
 def check_constant_stress(given: Blocks, degree: int, pair: Sequence[str], *further: Fixed) -> None:
     """Check that two blocks have a constant stress under its tractions."""
     dim, axes, strain = given.dim, given.axes, strain_of(given)
-    stress = (LAW.bulk - 2 * LAW.shear / 3) * np.trace(strain) * np.eye(dim)
-    stress += 2 * LAW.shear * strain
+    stress = hooke(LAW, strain)
     outward = {"left": -axes[:, 0], "right": axes[:, 0], "top": axes[:, -1]}
     outward |= {"front": -axes[:, 1], "back": axes[:, 1]}
     loads = [Load(part, constants(stress @ outward[part])) for part in ("top", *SIDES[dim])]
-    body = Body(LAW, [Fixed("bottom", [Linearly(row) for row in strain]), *further], loads)
+    body = Body(LAW, [Fixed("bottom", [Affine(tuple(row)) for row in strain]), *further], loads)
     problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
     state = check_linear(problem, strain)
     vectors = state.forces.vectors(problem.nodes)
@@ -230,7 +212,7 @@ def test_a_rim_that_is_held_carries_no_multiplier(
     """All of the outer boundary follows a linear field: the functions of the rim go inwards."""
     given = blocks(dim, cell=cell)
     strain = strain_of(given)
-    linear = [Linearly(row) for row in strain]
+    linear = [Affine(tuple(row)) for row in strain]
     body = Body(LAW, [Fixed(part, linear) for part in ("top", "bottom", *SIDES[dim])])
     problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
     # The rim has no jump of its own, and the gap of the others is that of the linear field.
@@ -242,7 +224,7 @@ def test_a_rim_that_is_held_carries_no_multiplier(
 def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int, cell: str) -> None:
     """Friction acts there on the other body, which is not held: a constant shear passes."""
     given = blocks(dim, cell=cell)
-    along = [Linearly(row) for row in strain_of(given)[:-1]]
+    along = [Affine(tuple(row)) for row in strain_of(given)[:-1]]
     check_constant_stress(given, degree, PAIRS[0], Fixed("upper_left", [*along, None]))
 
 

@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.methods.options import FixedPointOptions
-from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint
+from tests.problems.mechanics import solve
 from tests.problems.piezo import PERMITTIVITY, SCALED, SI, Column, potential
 
 COMM = MPI.COMM_WORLD
-TIGHT = FixedPointOptions(tolerance=1e-12)
 
 COLUMNS = {
     "insulated": Column(),
@@ -18,13 +16,6 @@ COLUMNS = {
     "driven": Column(k_e=0.3, phi_f=-5.0, top=7.0),
     "capacitor": Column(pressure=0.5, k_e=2.0, phi_f=32.0, top=3.0, coupling=0.0),
 }
-
-
-def solve(problem: ContactProblem, options: FixedPointOptions = TIGHT) -> FixedPoint:
-    solver = FixedPoint(problem, options)
-    _, outcome = solver.solve()
-    assert outcome.converged, outcome.reason
-    return solver
 
 
 def errors(solver: FixedPoint, column: Column, units):
@@ -64,7 +55,7 @@ def test_capacitor_formula():
 def test_column(name, dim, units):
     column = COLUMNS[name]
     problem = column.problem(COMM, dim, units)
-    solver = solve(problem)
+    solver = solve(problem, 1e-12)
     assert max(errors(solver, column, units)) < 1e-10
     pressure = solver.state.forces.contact / units.stress
     assert np.allclose(pressure, column.pressure, rtol=1e-10)
@@ -76,7 +67,7 @@ def test_column(name, dim, units):
 )
 def test_second_degree_and_perfect_conductor(dim, given):
     column = COLUMNS["conductive"]
-    solver = solve(column.problem(COMM, dim, **given))
+    solver = solve(column.problem(COMM, dim, **given), 1e-12)
     assert max(errors(solver, column, SCALED)) < 1e-10
 
 
@@ -85,7 +76,7 @@ def test_second_degree_and_perfect_conductor(dim, given):
 def test_lagged_charge_has_the_same_limit(dim):
     column = Column(k_e=0.1, phi_f=32.0)
     problem = column.problem(COMM, dim, lagged=True)
-    solver = solve(problem)
+    solver = solve(problem, 1e-12)
     assert max(errors(solver, column, SCALED)) < 1e-10
     assert len(solver.history) > 3
 
@@ -99,7 +90,7 @@ def test_units_do_not_matter(name, dim):
     column, runs = COLUMNS[name], []
     for units in (SCALED, SI):
         problem = column.problem(COMM, dim, units, mu=0.2)
-        solver = solve(problem)
+        solver = solve(problem, 1e-12)
         phi = potential(problem, solver.state) / units.potential
         steps = [record.inner for record in solver.history]
         runs.append((problem.nodal(solver.state)[:, :dim], phi, steps))

@@ -5,7 +5,6 @@ import pytest
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.body import Electrode, Fixed
 from contact.model.contact import Contact
@@ -14,12 +13,11 @@ from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.results.resultants import charge_balance, movements
-from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear
 from forms.laws import PerfectConductivity, ShiftedConductivity, Truncation
 from forms.piezo import from_voigt
 from tests.problems.blocks import Blocks
-from tests.problems.mechanics import constant, flat
+from tests.problems.mechanics import constant, flat, solved_by
 
 SELF = MPI.COMM_SELF
 VOLTS, CONDUCTANCE, UPPER, LOWER = 3.0, 2.0, 0.5, 4.0
@@ -65,9 +63,8 @@ def columns(
     return ContactProblem(Blocks(jitter=0.1).domain(SELF), body, contact, degree=degree)
 
 
-def solved(problem, method):
-    state, outcome = method.solve()
-    assert outcome.converged, outcome.reason
+def solved(problem, options):
+    state = solved_by(problem, options).state
     return state, charge_balance(problem, state)
 
 
@@ -78,12 +75,10 @@ def solved(problem, method):
 def test_columns_in_series(how, pair, degree):
     """I = V/(H_1/beta_1 + 1/k + H_2/beta_2), and what leaves one body enters the other."""
     problem = columns(degree=degree, pair=pair)
+    options = NewtonOptions(tolerance=1e-11, condense=how == "condensed")
     if how == "uzawa":
-        method = FixedPoint(problem, FixedPointOptions(tolerance=1e-11))
-    else:
-        options = NewtonOptions(tolerance=1e-11, condense=how == "condensed")
-        method = Newton(problem, options)
-    state, charges = solved(problem, method)
+        options = FixedPointOptions(tolerance=1e-11)
+    state, charges = solved(problem, options)
     current = VOLTS / (1 / UPPER + 1 / CONDUCTANCE + 1 / LOWER)
     assert abs(charges.electrodes["top"]) == pytest.approx(current, rel=1e-10)
     lost = charges.electrodes["top"] + charges.electrodes["bottom"]
@@ -100,8 +95,7 @@ def test_columns_in_series(how, pair, degree):
 @pytest.mark.parametrize("condense", [True, False])
 def test_an_electrode_of_given_charge_on_a_column_in_series(condense):
     problem = columns(0.25)
-    method = Newton(problem, NewtonOptions(tolerance=1e-11, condense=condense))
-    state, charges = solved(problem, method)
+    state, charges = solved(problem, NewtonOptions(tolerance=1e-11, condense=condense))
     potential = movements(problem, state)["electrodes"]["top"]["potential"]
     resistance = 1 / UPPER + 1 / CONDUCTANCE + 1 / LOWER
     assert abs(potential) == pytest.approx(0.25 * resistance, rel=1e-10)
@@ -109,13 +103,12 @@ def test_an_electrode_of_given_charge_on_a_column_in_series(condense):
     assert charges.electrodes["bottom"] == pytest.approx(-0.25, rel=1e-10)
 
 
-@pytest.mark.parametrize("method", [Newton, FixedPoint])
+@pytest.mark.parametrize("options", [NewtonOptions, FixedPointOptions])
 @pytest.mark.parametrize("conductance", [1e-9, 1e3, 1e9, 1e12])
-def test_what_hardly_conducts_and_what_bonds_the_bodies(conductance, method):
+def test_what_hardly_conducts_and_what_bonds_the_bodies(conductance, options):
     """What potentials owe to rounding, times the conductance, is no charge out of balance."""
     problem = columns(conductance=conductance)
-    made = NewtonOptions() if method is Newton else FixedPointOptions()
-    state, charges = solved(problem, method(problem, made))
+    state, charges = solved(problem, options())
     current = VOLTS / (1 / UPPER + 1 / conductance + 1 / LOWER)
     assert abs(charges.electrodes["top"]) == pytest.approx(current, rel=1e-7)
     assert evaluate(problem, state).equilibrium_rounding < 1e-5

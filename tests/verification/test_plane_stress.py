@@ -11,13 +11,13 @@ from scipy.optimize import brentq
 from contact import Body, Contact, Fixed, Linear, Load, Log, Material, Problem, parse_case, solve
 from contact.case.build import build_problem
 from contact.errors import InputError
-from contact.results.fields import DerivedFields
 from forms.hencky import Isotropic
 from forms.history import Response, differential, isotropic_stiffness
 from forms.j2 import J2, Voce
 from forms.plane_stress import ACROSS, HenckyAtPoints, PlaneStressHistory, in_plane_stress
 from tests.body.test_rollers import sector
 from tests.problem.test_electrodes_inside import BETA33, C11, C13, C33, CERAMIC, E31, E33
+from tests.problems.mechanics import at_points
 from tests.problems.membrane import membrane
 
 COMM = MPI.COMM_WORLD
@@ -78,18 +78,10 @@ def test_a_strip_is_a_bar(name, degree):
     assert solution.converged
     along, across = uniaxial(name, 1.2)
     assert corner(solution) == pytest.approx([2 * along, across], rel=1e-8)
-    strain, stress = tensors(solution)
+    strain, stress = (at_points(solution, name) for name in ("strain", "stress"))
     assert np.allclose(strain[:, 2, 2], across, rtol=1e-7, atol=0)
     assert np.allclose(stress[:, 0, 0], 1.2, rtol=1e-8, atol=0)
     assert np.abs(stress[:, [1, 2], [1, 2]]).max(initial=0.0) < 1e-8
-
-
-def tensors(solution):
-    """Return strains and stresses at points of the owned cells, shape (n, 3, 3) each."""
-    fields = DerivedFields(solution.problem.body, solution.state)
-    rows = [values.reshape(-1, values.shape[-1]) for _, values in fields.chunks()]
-    every = np.concatenate(rows) if rows else np.zeros((0, 40))
-    return [every[:, fields.columns[name]].reshape(-1, 3, 3) for name in ("strain", "stress")]
 
 
 @pytest.mark.core
@@ -152,7 +144,7 @@ def test_a_ceramic_sheet_under_a_voltage_and_a_pull():
     # across, x, y; phi grows along y, by which the field is -voltage
     strain = np.linalg.solve(c, np.array([0.0, pull, 0.0]) - e * voltage)
     assert corner(solution) == pytest.approx([2 * strain[1], strain[2]], rel=1e-9)
-    found = tensors(solution)[0]
+    found = at_points(solution, "strain")
     assert np.allclose(found[:, 2, 2], strain[0], rtol=1e-8, atol=0)
     charge = solution.charges.electrodes["top"]
     displacement = e @ strain - BETA33 * voltage

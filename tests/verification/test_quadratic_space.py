@@ -16,14 +16,8 @@ from contact.results.contact_nodes import contact_table
 from forms.hencky import Linear
 from tests.problems.mechanics import constant, leaning_block
 from tests.problems.piezo import Column, potential
-from tests.problems.rigid import indented, solved
 
 SELF = MPI.COMM_SELF
-
-
-def quadratic(n, **rigid):
-    case = indented(3, n, **rigid)
-    return case.model_copy(update={"space": case.space.model_copy(update={"degree": 2})})
 
 
 METHODS = {
@@ -69,19 +63,6 @@ def test_no_node_is_in_the_ball():
     table = contact_table(solution)
     assert table is not None
     assert table["x"].size == np.count_nonzero(top)
-
-
-def test_a_ball_that_is_pressed_and_one_that_is_moved():
-    still = [0.0, 0.0]
-    case = quadratic(2, displacement=[*still, "free"], force=[*still, -0.02])
-    forced, moved = solved(case, SELF)
-    _, same = solved(case, SELF, NewtonOptions(tolerance=1e-10, condense=False, linear="lu"))
-    depth = moved["rigid"]["displacement"][-1]
-    assert same["rigid"]["displacement"][-1] == pytest.approx(depth, rel=1e-9)
-    driven, held = solved(quadratic(2, displacement=[*still, depth]), SELF)
-    assert held["rigid"]["force"][-1] == pytest.approx(-0.02, rel=1e-10)
-    scale = np.abs(driven.pressure).max()
-    assert np.allclose(forced.pressure, driven.pressure, rtol=0, atol=1e-9 * scale)
 
 
 @pytest.mark.parallel
