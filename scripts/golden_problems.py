@@ -29,7 +29,7 @@ from contact import (
     solve_steps,
     write_outputs,
 )
-from scripts.cases import CASES, bar
+from scripts.cases import CASES, bar, on_grid
 from scripts.gallery import EXAMPLES, Run
 from scripts.golden import Value, counted, measured
 from scripts.thesis import table_7_1, table_7_2, tables_compliance, tables_piezo
@@ -598,7 +598,7 @@ THESIS: Mapping[str, Callable[[], dict[str, Value]]] = {
     },
     **{
         f"Table {number}, {name}": partial(
-            counts, tables_compliance.case_of(file, (16, 8), "electric.phi_f=8", *changes)
+            counts, on_grid(file, (16, 8), "electric.phi_f=8", *changes)
         )
         for number, (file, _) in tables_piezo.THESIS.items()
         for name, changes in (
@@ -609,7 +609,7 @@ THESIS: Mapping[str, Callable[[], dict[str, Value]]] = {
     **{
         f"Table 8.4{suffix}, {name}": partial(
             counts,
-            tables_compliance.case_of(
+            on_grid(
                 f"compliance-8-4{suffix}", (24, 4), "friction.mu=0.068", "electric.k_e=0.068",
                 *changes,
             ),

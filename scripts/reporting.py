@@ -48,6 +48,11 @@ rcParams["axes.prop_cycle"] = cycler(
 )
 
 
+#: Columns of equal lengths by their names, or rows, each with its values by these names.
+Columns = Mapping[str, Sequence[Any]]
+Table = Columns | Sequence[Mapping[str, Any]]
+
+
 @dataclass(frozen=True)
 class Report:
     """A folder that tables and figures are written to, by rank 0."""
@@ -55,12 +60,11 @@ class Report:
     #: The folder; it is made if need be.
     out: Path
 
-    def table(
-        self, name: str, caption: str, columns: Mapping[str, Sequence[Any]], note: str = ""
-    ) -> None:
-        """Print a table and write it; the columns have equal lengths."""
+    def table(self, name: str, caption: str, given: Table, note: str = "") -> None:
+        """Print a table and write it."""
         if MPI.COMM_WORLD.rank > 0:
             return
+        columns = given if isinstance(given, Mapping) else _columns(given)
         self._csv(name, columns)
         rows = [[text(value) for value in row] for row in zip(*columns.values(), strict=True)]
         lines = [list(columns), *rows]
@@ -79,7 +83,7 @@ class Report:
         name: str,
         caption: str,
         figure: Figure,
-        data: Mapping[str, Sequence[Any]],
+        data: Columns,
         note: str = "",
     ) -> None:
         """Write a figure and the numbers that it shows (columns may have unequal lengths)."""
@@ -96,12 +100,12 @@ class Report:
         self._csv(name, padded)
         self._fragment(name, caption, f"![{caption}]({name}.png)", note)
 
-    def numbers(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
+    def numbers(self, name: str, columns: Columns) -> None:
         """Write numbers that are too many for a page."""
         if MPI.COMM_WORLD.rank == 0:
             self._csv(name, columns)
 
-    def _csv(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
+    def _csv(self, name: str, columns: Columns) -> None:
         self.out.mkdir(parents=True, exist_ok=True)
         with (self.out / f"{name}.csv").open("w", newline="") as stream:
             writer = csv.writer(stream)
@@ -111,6 +115,11 @@ class Report:
     def _fragment(self, name: str, caption: str, body: str, note: str) -> None:
         parts = [f"**{caption}**", body, *([note] if note else []), f"Numbers: `{name}.csv`"]
         (self.out / f"{name}.md").write_text("\n\n".join(parts) + "\n")
+
+
+def _columns(rows: Sequence[Mapping[str, Any]]) -> Columns:
+    """Return rows as columns, those of the first row; None where another has no value."""
+    return {key: [row.get(key) for row in rows] for key in rows[0]}
 
 
 def empty(*names: str) -> dict[str, list[Any]]:

@@ -63,10 +63,10 @@ from tests.problems import pairs
 from tests.problems.mechanics import attempt, bar_case, leaning_block, newton, pressed_block
 from tests.problems.mechanics import bar as short_bar
 from tests.problems.mechanics import solve as relax
+from tests.problems.piezo import example, first_solve
 from tests.problems.rigid import indented
 from tests.problems.rings import between_plates, squeezed
 from tests.problems.shaken import shaken, times
-from tests.verification.test_piezo_examples import example, first_solve
 from tests.verification.test_punch import SUNK, TILTED, punched
 
 COMM = MPI.COMM_WORLD

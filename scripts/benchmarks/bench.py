@@ -23,7 +23,7 @@ import numpy as np
 
 from meshes import write
 from scripts.benchmarks.pages import write_memory, write_page
-from scripts.benchmarks.processes import Run, columns, command, measured, run, started
+from scripts.benchmarks.processes import Run, command, measured, run, started
 from scripts.reporting import Report, parser
 
 #: Seconds after which a run of the peer is ended: it is then shown as one of infinite length.
@@ -69,7 +69,7 @@ def against_one_solve(bench: Bench) -> None:
     bench.report.table(
         "bench-ratio",
         "Nonlinear solve against one linear elasticity solve",
-        columns(rows),
+        rows,
         "Example 7.2 with Hencky's law and friction, and a block in 3-D, from a zero initial "
         "guess. *cold*: on the mesh itself alone. *as it chooses*: by way of coarser meshes where "
         "that is faster; their time counts. `one`: assembly, set-up and solve of linear "
@@ -97,7 +97,7 @@ def ranks(bench: Bench) -> None:
                 "of a linear solve": one["one"] / two["one"],
             }
         )
-    bench.report.table("bench-ranks", "One rank against two, cold", columns(rows))
+    bench.report.table("bench-ranks", "One rank against two, cold", rows)
 
 
 def memory(bench: Bench) -> None:
@@ -126,7 +126,7 @@ def memory(bench: Bench) -> None:
     bench.report.table(
         "bench-memory",
         "Memory of all ranks together",
-        columns(held),
+        held,
         "Peaks of the whole run beyond the memory of the loaded libraries, and those of one "
         "linear solve by dolfinx and PETSc alone.",
     )
@@ -150,7 +150,7 @@ def against_getfem(bench: Bench) -> None:
     bench.report.table(
         "bench-getfem",
         "Against GetFEM: Example 7.2 with a linear material, Example 7.1, and a block in 3-D",
-        columns(rows),
+        rows,
         "*cells*: per unit length of the bar and the block, and on Hertz's half-width. Seconds "
         "of the whole Newton solve, both warm; a run of GetFEM that took more than "
         f"{TIMEOUT:.0f} s is shown as inf. GetFEM has its integral contact brick, an augmented "
@@ -197,7 +197,7 @@ def phases(bench: Bench) -> None:
         bench.report.table(
             f"bench-phases-{dimension}d",
             f"Where the time goes, {found['unknowns']} unknowns in {dimension}-D",
-            {name: [row.get(name) for row in rows] for name in rows[0]},
+            rows,
             "One linear solve and the nonlinear one in one process; seconds of the processor.",
         )
 

@@ -127,7 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Report(options.out).table(
         "peer-pair",
         "A block pressed on another one and pushed along: GetFEM and this code on the same meshes",
-        {name: [row[name] for row in rows] for name in rows[0]},
+        rows,
         "Seconds of the processor for the solve, one thread. *apart*: the largest difference of "
         "the displacements over the largest displacement.",
     )

@@ -182,7 +182,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Report(given.out).table(
         "peer-plain",
         "Plain dolfinx with a penalty beside this code, on the same meshes",
-        {name: [row[name] for row in rows] for name in rows[0]},
+        rows,
         "Seconds of the processor for the nonlinear solve, forms compiled, one thread. "
         "Penetration and displacement are over the largest displacement. The contact force is "
         "relative, and so is the pressure, in L2 of the contact boundary. This code meets "

@@ -69,8 +69,3 @@ def run(*arguments: str, ranks: int = 1) -> Run:
     """
     words = [*command("bench_one"), *arguments]
     return measured(words, ranks, XDG_CACHE_HOME=_own_cache().name)
-
-
-def columns(rows: Sequence[Run]) -> dict[str, list[Any]]:
-    """Return rows as columns."""
-    return {key: [row.get(key) for row in rows] for key in rows[0]}

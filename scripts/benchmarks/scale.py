@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
@@ -85,12 +84,12 @@ SHOWN: dict[str, dict[str, tuple[str, float]]] = {
 }
 
 
-def tabulated(table: str, rows: Sequence[Run]) -> dict[str, list[Any]]:
-    """Return the columns of a table, given the runs."""
-    return {
-        name: [row[key] / unit if unit > 1 else row[key] for row in rows]
-        for name, (key, unit) in SHOWN[table].items()
-    }
+def tabulated(table: str, runs: Sequence[Run]) -> list[Run]:
+    """Return the rows of a table, given the runs."""
+    return [
+        {n: run[key] / unit if unit > 1 else run[key] for n, (key, unit) in SHOWN[table].items()}
+        for run in runs
+    ]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

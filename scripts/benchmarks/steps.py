@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         report.table(
             "bench-steps",
             "Load steps beside one static solve",
-            {key: [row[key] for row in rows] for key in rows[0]},
+            rows,
             "Example 7.2 and a block in 3-D, linear material, friction. `static` is one step to "
             f"the full load, the mean of {REPEATED} before the steps and {REPEATED} after them; "
             "seconds of the processor, of one process.",
@@ -109,7 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         report.table(
             "bench-sweep",
             f"{LOADS} loads swept, each from the one before or from the zero initial guess",
-            {key: [row[key] for row in rows] for key in rows[0]},
+            rows,
             f"Example 7.2, Hencky's law; {share:.2f} of the seconds of the processor.",
         )
 

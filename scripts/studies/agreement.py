@@ -89,35 +89,33 @@ def penalised(branches: Branches, solution: Solution, eps: float) -> Options:
 
 def agreement(report: Report, compared: Sequence[Compared]) -> None:
     """Tabulate the differences between Newton's method and Uzawa block relaxation. Collective."""
-    columns = empty(
-        "example", "unknowns", "newton", "uzawa", "solves", "uzawa's", "u", "phi", "energy", "p",
-        "tau", "verdict", "solutions", "warned",
-    )  # fmt: skip
+    rows = []
     for one in compared:
         newton, uzawa = one.runs["newton"], one.runs["uzawa"]
         apart = one.branches.difference(uzawa, newton)
         dofmap = one.branches.problem.body.space.dofmap
-        append(
-            columns,
-            one.example.label,
-            dofmap.index_map.size_global * dofmap.index_map_bs,
-            newton.outcome.residuals.largest,
-            uzawa.outcome.residuals.largest,
-            newton.counters.linear_solves,
-            uzawa.counters.linear_solves,
-            apart.u,
-            apart.phi,
-            apart.energy,
-            apart.pressure,
-            apart.friction,
-            verdict(one, apart.largest),
-            len(one.branches.solutions),
-            one.branches.warned(newton),
+        rows.append(
+            {
+                "example": one.example.label,
+                "unknowns": dofmap.index_map.size_global * dofmap.index_map_bs,
+                "newton": newton.outcome.residuals.largest,
+                "uzawa": uzawa.outcome.residuals.largest,
+                "solves": newton.counters.linear_solves,
+                "uzawa's": uzawa.counters.linear_solves,
+                "u": apart.u,
+                "phi": apart.phi,
+                "energy": apart.energy,
+                "p": apart.pressure,
+                "tau": apart.friction,
+                "verdict": verdict(one, apart.largest),
+                "solutions": len(one.branches.solutions),
+                "warned": one.branches.warned(newton),
+            }
         )
     report.table(
         "agreement",
         f"Newton's method and Uzawa block relaxation, both to residuals of {TOLERANCE:g}",
-        columns,
+        rows,
         "*newton*, *uzawa*: the largest residual at the end, computed from scratch. *solves*: "
         "the linear solves of the whole body. The next columns are relative differences of the "
         "two solutions. *u*, *phi*: the largest difference at a node. *energy*: the larger one "
@@ -141,26 +139,27 @@ def verdict(one: Compared, apart: float) -> str:
 
 def limits(report: Report, compared: Sequence[Compared]) -> None:
     """Tabulate how the penalised solutions tend to those with multipliers. Collective."""
-    columns = empty("example", "converged", "limit", *EPS, "order", "p", "order of p")
+    rows = []
     for one in compared:
         runs = [one.runs[name] for name in EPS]
         near, apart = zip(*map(one.branches.nearest, runs), strict=True)
         u = [float(np.nanmax([each.u, each.phi])) for each in apart]
         p = [each.pressure for each in apart]
-        append(
-            columns,
-            one.example.label,
-            all(run.converged for run in runs),
-            path(near),
-            *u,
-            last_order(near, u),
-            p[-1],
-            last_order(near, p),
+        rows.append(
+            {
+                "example": one.example.label,
+                "converged": all(run.converged for run in runs),
+                "limit": path(near),
+                **dict(zip(EPS, u, strict=True)),
+                "order": last_order(near, u),
+                "p": p[-1],
+                "order of p": last_order(near, p),
+            }
         )
     report.table(
         "agreement-penalty",
         "The penalty method as eps -> 0: distance to the solution with multipliers",
-        columns,
+        rows,
         "eps is relative: the penetration at the largest pressure is eps max|u|, and so is the "
         "slip length. The first eps is solved from zero displacement, each further one from the "
         f"solution of the last, to a residual of {PENALISED:g} of the penalised problem. *limit*: "

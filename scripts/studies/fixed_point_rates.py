@@ -14,7 +14,7 @@ from contact.model.friction import Friction
 from contact.results.fields import DerivedFields
 from contact.typing import Array
 from scripts.cases import bar
-from scripts.reporting import TWO_COLUMNS, Report, append, empty, iterates, subplots
+from scripts.reporting import TWO_COLUMNS, Report, iterates, subplots
 from scripts.studies.error_norms import errors
 from scripts.studies.mesh_series import RHO
 
@@ -81,9 +81,7 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
     """Show the errors of the fixed points per iteration; return observed rates. Collective."""
     n = 8 if coarse else 16
     figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.4), sharey=True)
-    columns = empty(
-        "iteration", "iterations", "observed rate", "max |dev eps|", "Kacanov's bound", "residual"
-    )
+    rows = []
     data: dict[str, Sequence[float]] = {}
     rates = {}
     chosen = ITERATIONS[1::3] if coarse else ITERATIONS
@@ -93,14 +91,15 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
         middle = distances[len(distances) // 3 : max(len(distances) - 3, len(distances) // 3 + 2)]
         rate = float((middle[-1] / middle[0]) ** (1 / max(len(middle) - 1, 1)))
         rates[iteration.label] = rate
-        append(
-            columns,
-            iteration.label,
-            len(distances) + 1,
-            rate,
-            strain,
-            secant_rate(strain),
-            residual,
+        rows.append(
+            {
+                "iteration": iteration.label,
+                "iterations": len(distances) + 1,
+                "observed rate": rate,
+                "max |dev eps|": strain,
+                "Kacanov's bound": secant_rate(strain),
+                "residual": residual,
+            }
         )
         data[iteration.label] = distances
         ax = axes[0 if iteration.eps is None else 1]
@@ -119,6 +118,6 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
         "compared](thesis-studies.md#agreement-of-the-methods))."
     )
     caption = "Theorems 3.2 and 4.5: errors of the fixed points per iteration, Example 7.2"
-    report.table("fixed-point-rates", caption, columns, note)
+    report.table("fixed-point-rates", caption, rows, note)
     report.figure("fixed-point-errors", caption, figure, data)
     return rates

@@ -199,26 +199,25 @@ def extrapolated(setting: Setting, extent: float = 30.0) -> tuple[Found, list[Fo
 
 def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS) -> None:
     """Tabulate ratios to the closed forms. Collective."""
-    columns = empty(
-        "material", "shape", "indenter", "P", "delta", "Q", "phi", "P in the box", "unknowns",
-    )  # fmt: skip
+    rows = []
     for material in materials:
         for shape in MOMENTS:
             for potential in (None, 0.0, 0.002):
                 setting = Setting(material, shape, potential, fineness)
                 found, boxes = extrapolated(setting)
                 kind = "insulating" if potential is None else f"at {potential:g} GV"
-                append(
-                    columns,
-                    material,
-                    shape,
-                    kind,
-                    found.force,
-                    found.depth,
-                    found.charge,
-                    found.potential,
-                    boxes[-1].force,
-                    found.unknowns,
+                rows.append(
+                    {
+                        "material": material,
+                        "shape": shape,
+                        "indenter": kind,
+                        "P": found.force,
+                        "delta": found.depth,
+                        "Q": found.charge,
+                        "phi": found.potential,
+                        "P in the box": boxes[-1].force,
+                        "unknowns": found.unknowns,
+                    }
                 )
     note = (
         "Ratios of the computed to the closed form at the computed contact radius (that of the "
@@ -227,7 +226,7 @@ def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS)
         "foundation conducts across gaps up to 1e-6 m: with conduction in contact alone, contact "
         "could end at any smaller radius, with a singular pressure."
     )
-    report.table("closed-forms", "Indentation, computed over closed form", columns, note)
+    report.table("closed-forms", "Indentation, computed over closed form", rows, note)
 
 
 def half_spaces(report: Report) -> None:

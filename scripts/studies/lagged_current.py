@@ -13,11 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from contact import Case, NotConvergedError, build_problem, load_case
+from contact import Case, NotConvergedError, build_problem
 from contact.methods.options import FixedPointOptions
 from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
-from scripts.cases import CASES
+from scripts.cases import on_grid
 from scripts.reporting import TWO_COLUMNS, Report, append, empty, iterates, subplots
 from scripts.studies.error_norms import ProductNorm
 
@@ -32,10 +32,8 @@ def case_of(
     name: str, cells: tuple[int, int], k_e: float, lagged: bool, changes: Sequence[str] = ()
 ) -> Case:
     """Return a case of Example 8.1 or 8.2."""
-    grid = f"mesh.cells=[{cells[0]}, {cells[1]}]"
-    flag = f"electric.lagged={str(lagged).lower()}"
-    own = [grid, f"electric.k_e={k_e}", flag, "solver.method=uzawa"]
-    return load_case(CASES / f"{name}.toml", [*own, *changes])
+    own = f"electric.k_e={k_e}", f"electric.lagged={str(lagged).lower()}", "solver.method=uzawa"
+    return on_grid(name, cells, *own, *changes)
 
 
 def errors(

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from contact import Case, Contact, GapFunction, Layer, NotConvergedError, build_problem, load_case
+from contact import Case, Contact, GapFunction, Layer, NotConvergedError, build_problem
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor
-from scripts.cases import CASES, TABLE_8_4
+from scripts.cases import TABLE_8_4, on_grid
 from scripts.reporting import (
     TWO_COLUMNS,
     Report,
@@ -77,9 +77,8 @@ class Errors:
 
 def case_of(name: str, cells: Sequence[int], changes: Sequence[str] = ()) -> Case:
     """Return a case file of Examples 8.3 and 8.4 on another mesh, solved to 1e-11."""
-    grid = f"mesh.cells=[{cells[0]}, {cells[1]}]"
     exact = ("solver.tolerance=1e-11", "solver.inner_tolerance=2e-12")
-    return load_case(CASES / f"{name}.toml", [grid, *exact, *changes])
+    return on_grid(name, cells, *exact, *changes)
 
 
 def theorem_6_3(

@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contact import Solution, load_case, solve
+from contact import Solution, solve
 from contact.results.resultants import charge_balance
 from contact.typing import Array
-from scripts.cases import CASES
+from scripts.cases import on_grid
 from scripts.reporting import Report, options
 
 #: A mesh that is as symmetric as the problem.
@@ -119,21 +119,19 @@ def refined(report: Report, example: str, levels: Sequence[int]) -> None:
         for cells in levels:
             if steep and cells > FINEST_STEEP:
                 continue
-            grid = f"mesh.cells=[{cells}, {cells // ratio}]"
             ramp = [f"electric.delta={STEEP / SIZES[name]}"] if steep else []
-            overrides = [grid, "solver.method=newton", *changes, *ramp]
-            found = measured(solve(load_case(CASES / f"{name}.toml", overrides)))
+            overrides = ["solver.method=newton", *changes, *ramp]
+            found = measured(solve(on_grid(name, (cells, cells // ratio), *overrides)))
             now = np.array([found[key] for key in WATCHED], dtype=float)
             row: dict[str, object] = {"cells": f"{cells} x {cells // ratio}", **found}
             row |= {f"change of {key}": c for key, c in zip(WATCHED, now - before, strict=True)}
             before = now
             rows.append(row)
             print(example, *(f"{key} = {value}" for key, value in row.items()), flush=True)
-    columns = {key: [row[key] for row in rows] for key in rows[0]}
     report.table(
         f"refinement-{example.split(',')[0].replace('.', '-')}{'-weak' * (',' in example)}",
         f"Example {example} on finer meshes",
-        columns,
+        rows,
         NOTES[example],
     )
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact import Solution, build_problem, load_case, solve
-from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options
+from contact import Solution, build_problem, solve
+from scripts.cases import on_grid
+from scripts.reporting import Report, options
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,8 @@ SWEEPS: Mapping[str, Sweep] = {
 
 def run(sweep: Sweep, value: float, cells: tuple[int, int], domain: object) -> Solution:
     """Solve with one value. Collective."""
-    changes = (f"mesh.cells=[{cells[0]}, {cells[1]}]", f"{sweep.key}={value}")
-    case = load_case(CASES / f"{sweep.case}.toml", ["solver.method=newton", *changes])
-    solution = solve(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
-    return solution
+    case = on_grid(sweep.case, cells, "solver.method=newton", f"{sweep.key}={value}")
+    return solve(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
 
 
 def study(report: Report, name: str, coarse: bool) -> None:
@@ -90,25 +88,25 @@ def study(report: Report, name: str, coarse: bool) -> None:
     sweep = SWEEPS[name]
     cells = (24, 24 // (sweep.cells[0] // sweep.cells[1])) if coarse else sweep.cells
     parameter = name.partition("-")[0]
-    columns = empty(
-        parameter, "contact force", "max p", "p in L2", "in contact", "converged", "residual",
-    )  # fmt: skip
+    rows: list[dict[str, object]] = []
     domain = None
     for value in sweep.values:
         solution = run(sweep, value, cells, domain)
         domain, nodes = solution.problem.domain, solution.problem.nodes
-        append(
-            columns,
-            value,
-            float(-solution.contact_force[1]),
-            nodes.maximum(solution.pressure),
-            nodes.norm(solution.pressure),
-            int(nodes.sum(np.where(solution.status == "open", 0.0, 1.0 / nodes.weight))),
-            solution.converged,
-            solution.outcome.residuals.largest,
+        closed = nodes.sum(np.where(solution.status == "open", 0.0, 1.0 / nodes.weight))
+        rows.append(
+            {
+                parameter: value,
+                "contact force": float(-solution.contact_force[1]),
+                "max p": nodes.maximum(solution.pressure),
+                "p in L2": nodes.norm(solution.pressure),
+                "in contact": int(closed),
+                "converged": solution.converged,
+                "residual": solution.outcome.residuals.largest,
+            }
         )
     caption = f"Sensitivity to {parameter}: Example {sweep.example}, {cells[0]} x {cells[1]} cells"
-    report.table(f"sensitivity-{name}-table", caption, columns, sweep.note)
+    report.table(f"sensitivity-{name}-table", caption, rows, sweep.note)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

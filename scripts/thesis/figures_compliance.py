@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
-from contact import Solution, build_problem, load_case
+from contact import Solution, build_problem
 from contact.interface.complementarity import project_disc, project_half_line
 from contact.interface.foundation import NormalGraph
 from contact.plot.body import Picture, draw_plane, picture
@@ -20,7 +20,7 @@ from contact.plot.contact import draw_line
 from contact.results.contact_nodes import Table, contact_table, tangent_of
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity
-from scripts.cases import CASES
+from scripts.cases import on_grid
 from scripts.reporting import (
     ONE_COLUMN,
     TWO_COLUMNS,
@@ -176,7 +176,7 @@ def solution_of(
     name: str, cells: tuple[int, int], *changes: str, **replacements: object
 ) -> Solution:
     """Solve a case file on a mesh. Collective."""
-    case = load_case(CASES / f"{name}.toml", [f"mesh.cells=[{cells[0]}, {cells[1]}]", *changes])
+    case = on_grid(name, cells, *changes)
     return solved(case, build_problem(case, **replacements))
 
 

@@ -17,7 +17,7 @@ from contact.plot.body import draw_plane, picture
 from contact.results.contact_nodes import contact_table
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import TWO_COLUMNS, Report, append, empty, options, run_of, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots
 
 
 @dataclass(frozen=True)
@@ -211,34 +211,31 @@ CYLINDERS = (
 
 def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], Solution]:
     """Make the table of cylinders; return its solutions by row. Collective."""
-    columns = empty(
-        "shape", "load", "mu", "direction", "b/h", "b/b_H (edge)", "b/b_H (moment)", "p_0/p_H",
-        "force error", "residual",
-    )  # fmt: skip
-    solutions = {}
+    rows, solutions = [], {}
     for load, mu, direction, shape in CYLINDERS:
         hertz = Cylinder(load)
         case = cylinder(load, mu=mu, direction=direction, shape=shape, fineness=fineness)
         part = load / 2 if shape == "quarter_disc" else load
         solution, found = run(case, part)
         solutions[load, mu, direction, shape] = solution
-        append(
-            columns,
-            shape,
-            load,
-            mu,
-            direction,
-            hertz.half_width / found.h,
-            found.edge / hertz.half_width,
-            found.moment / hertz.half_width,
-            found.peak / hertz.peak,
-            found.force_error,
-            solution.outcome.residuals.largest,
+        rows.append(
+            {
+                "shape": shape,
+                "load": load,
+                "mu": mu,
+                "direction": direction,
+                "b/h": hertz.half_width / found.h,
+                "b/b_H (edge)": found.edge / hertz.half_width,
+                "b/b_H (moment)": found.moment / hertz.half_width,
+                "p_0/p_H": found.peak / hertz.peak,
+                "force error": found.force_error,
+                "residual": solution.outcome.residuals.largest,
+            }
         )
     report.table(
         "hertz-cylinder",
         "Cylinder on a plane (Example 7.1): half-width and peak pressure over Hertz's",
-        columns,
+        rows,
         "Example 7.1 is the load 1600. There b/R is 0.34, and the solution of linear elasticity "
         "is no longer Hertz's; with the small loads it is. (edge) is where p^2, extrapolated in "
         "x^2, vanishes. (moment) is the half-width of the elliptic pressure with the same second "
@@ -313,39 +310,31 @@ def approach(solution: Solution) -> float:
     return float(body.comm.allreduce(-u[middle, 2].sum(), op=MPI.SUM))
 
 
-def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, list[float]]:
-    """Make the table of spheres over (fineness, degree); return the ratios. Collective."""
+def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> None:
+    """Make the table of spheres over (fineness, degree). Collective."""
     hertz = Sphere()
-    columns = empty(
-        "a/h wanted", "degree", "dofs", "a/a_H (moment)", "p_0/p_H (fit)",
-        "approach/Hertz's at depth R", "force error", "p_0/p_H (node)", "Newton steps", "residual",
-    )  # fmt: skip
-    ratios: dict[str, list[float]] = {"radius": [], "peak": [], "approach": [], "force": []}
+    rows = []
     for fineness, degree in levels:
         solution, found = run(sphere(fineness, degree), hertz.force / 4)
-        space = solution.problem.body.space
-        values = {
-            "radius": found.moment / hertz.contact_radius,
-            "peak": found.centre / hertz.peak,
-            "approach": approach(solution) / hertz.axial(hertz.radius),
-            "force": found.force_error,
-        }
-        append(
-            columns,
-            fineness,
-            degree,
-            space.dofmap.index_map.size_global * space.dofmap.index_map_bs,
-            *values.values(),
-            found.peak / hertz.peak,
-            len(solution.history),
-            solution.outcome.residuals.largest,
+        dofmap = solution.problem.body.space.dofmap
+        rows.append(
+            {
+                "a/h wanted": fineness,
+                "degree": degree,
+                "dofs": dofmap.index_map.size_global * dofmap.index_map_bs,
+                "a/a_H (moment)": found.moment / hertz.contact_radius,
+                "p_0/p_H (fit)": found.centre / hertz.peak,
+                "approach/Hertz's at depth R": approach(solution) / hertz.axial(hertz.radius),
+                "force error": found.force_error,
+                "p_0/p_H (node)": found.peak / hertz.peak,
+                "Newton steps": len(solution.history),
+                "residual": solution.outcome.residuals.largest,
+            }
         )
-        for key, value in values.items():
-            ratios[key].append(value)
     report.table(
         "hertz-sphere",
         "Sphere on a plane over Hertz's solution",
-        columns,
+        rows,
         "The radius a is that of the second moment of the pressure. The largest pressure p_0 is "
         "given twice: by p^2 as a linear function of r^2 near the axis (fit), and as the largest "
         "nodal value (node). The body is a half ball, and its approach is that of the middle of "
@@ -357,7 +346,6 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
         "0.9972 by fit, 1.037 and 1.008 at a node. These ratios do not show how deep vertices "
         "then penetrate.",
     )
-    return ratios
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -12,8 +12,9 @@ import numpy as np
 from contact import build_problem
 from contact.body.equilibrium import BodyEquilibrium
 from contact.problem.state import State
+from scripts.cases import on_grid
 from scripts.reporting import Report, append, empty, iterates, options
-from scripts.thesis.tables_compliance import EPS_FP, LAGGED, case_of
+from scripts.thesis.tables_compliance import EPS_FP, LAGGED
 
 #: The thesis's count.
 THESIS = 2
@@ -59,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     stopping = ("solver.stopping=thesis", "solver.max_outer=20", "solver.eps_fp=1e-13")
     for topic, name in CASES.items():
         for rule, changes in RULES.items():
-            case = case_of(name, cells, *LAGGED[:1], *LAGGED[2:], *stopping, *changes)
+            case = on_grid(name, cells, *LAGGED[:1], *LAGGED[2:], *stopping, *changes)
             problem = build_problem(case)
             body = problem.body
             # From zero; the iteration after which nothing moves is the last that counts.

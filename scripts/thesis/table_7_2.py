@@ -13,7 +13,7 @@ from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.results.solution import Solution
 from scripts.cases import bar
-from scripts.reporting import Report, append, empty, observed_orders, options, solved
+from scripts.reporting import Report, empty, observed_orders, options, solved
 from scripts.studies.error_norms import DualNorm, errors
 
 LOADS = (-0.005, -0.05)
@@ -51,14 +51,7 @@ def penalty(problem: ContactProblem, n: int, load: float, eps: float, *changes: 
 
 def table(report: Report, n: int) -> None:
     """Make the counterpart of Table 7.2. Collective."""
-    counts = empty(
-        "f2", "eps", "thesis", "(4.38)", "SNES", "residual then", "Algorithm 3 to 1e-8",
-        "its residual", "with implicit end", "SNES then", "residual of (PV_eps)",
-    )  # fmt: skip
-    measured = empty(
-        "f2", "eps", "residual of (PV_eps)", "contact residual", "friction residual", "u in L2",
-        "u in energy", "p",
-    )  # fmt: skip
+    counts, measured = [], []
     for load in LOADS:
         problem = build_problem(bar(n, load, RHO))
         reference = solved(bar(n, load, RHO, "solver.tolerance=1e-10"), problem)
@@ -68,28 +61,31 @@ def table(report: Report, n: int) -> None:
             alone = checked(penalty(problem, n, load, eps, lagged, "solver.max_outer=1000"))
             converged = checked(penalty(problem, n, load, eps))
             error, kkt = distance(reference, converged), converged.outcome.residuals
-            append(
-                counts,
-                load,
-                eps,
-                thesis,
-                *_counts(stopped),
-                stopped.outcome.residuals.equilibrium,
-                _counts(alone)[0],
-                alone.outcome.residuals.equilibrium,
-                *_counts(converged),
-                kkt.equilibrium,
+            row = {"f2": load, "eps": eps}
+            counts.append(
+                {
+                    **row,
+                    "thesis": thesis,
+                    "(4.38)": len(stopped.history),
+                    "SNES": inner(stopped),
+                    "residual then": stopped.outcome.residuals.equilibrium,
+                    "Algorithm 3 to 1e-8": len(alone.history),
+                    "its residual": alone.outcome.residuals.equilibrium,
+                    "with implicit end": len(converged.history),
+                    "SNES then": inner(converged),
+                    "residual of (PV_eps)": kkt.equilibrium,
+                }
             )
-            append(
-                measured,
-                load,
-                eps,
-                kkt.equilibrium,
-                kkt.contact,
-                kkt.friction,
-                error.l2,
-                error.energy,
-                error.pressure,
+            measured.append(
+                {
+                    **row,
+                    "residual of (PV_eps)": kkt.equilibrium,
+                    "contact residual": kkt.contact,
+                    "friction residual": kkt.friction,
+                    "u in L2": error.l2,
+                    "u in energy": error.energy,
+                    "p": error.pressure,
+                }
             )
     where = f"Example 7.2, rho = {RHO:g}, {4 * n} x {n} cells"
     report.table(
@@ -125,9 +121,9 @@ def checked(solution: Solution) -> Solution:
     return solution
 
 
-def _counts(solution: Solution) -> tuple[int, int]:
-    records = solution.history
-    return len(records), sum(record.inner for record in records)
+def inner(solution: Solution) -> int:
+    """Return the inner iterations of a run."""
+    return sum(record.inner for record in solution.history)
 
 
 def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, list[float]]:

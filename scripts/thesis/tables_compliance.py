@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contact import Case, Solution, build_problem, load_case, solve
+from contact import Case, Solution, build_problem, solve
 from contact.mesh.domain import Domain
-from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options
+from scripts.cases import on_grid
+from scripts.reporting import Report, options
 
 #: mu = k_e -> iterations of the thesis.
 THESIS: Mapping[float, int] = {
@@ -61,11 +61,6 @@ EXAMPLES = {
 }
 
 
-def case_of(name: str, cells: tuple[int, int], *changes: str) -> Case:
-    """Return a case file on a mesh."""
-    return load_case(CASES / f"{name}.toml", [f"mesh.cells=[{cells[0]}, {cells[1]}]", *changes])
-
-
 def run(case: Case, domain: Domain | None = None) -> Solution:
     """Solve a case as far as its method gets. Collective."""
     solution = solve(build_problem(case, domain=domain), case.solver)
@@ -88,44 +83,41 @@ def table_8_4(
     report: Report, cells: tuple[int, int], suffix: str, rows: Mapping[float, int] = THESIS
 ) -> None:
     """Make the counterpart of Table 8.4, as printed or with the layer. Collective."""
-    columns = empty(
-        "mu = k_e", "thesis", "Alg. 6, (3.46)", "delta = 83.3", "Alg. 6, literal", "residual left",
-        "Alg. 6, 1e-8", "implicit, 1e-8", "solves", "residual", "Newton", "at contact",
-        "difference",
-    )  # fmt: skip
-    domain = build_problem(case_of(f"compliance-8-4{suffix}", cells)).domain
+    table: list[dict[str, object]] = []
+    domain = build_problem(on_grid(f"compliance-8-4{suffix}", cells)).domain
     for value, thesis in rows.items():
 
         def solution(*changes: str, value: float = value) -> Solution:
             both = f"friction.mu={value}", f"electric.k_e={value}"
-            return run(case_of(f"compliance-8-4{suffix}", cells, *both, *changes), domain)
+            return run(on_grid(f"compliance-8-4{suffix}", cells, *both, *changes), domain)
 
         lagged = iterations(solution(*LAGGED, *EXACT))
         implicit, newton = solution(), solution("solver.method=newton")
         literal = solution(*LITERAL)
         alone = newton.converged
         met = "criterion is met" in literal.outcome.reason
-        append(
-            columns,
-            value,
-            thesis,
-            lagged[0],
-            iterations(solution(*LAGGED, *EXACT, STEEP))[0],
-            literal.history[-1].iteration if met else np.nan,
-            literal.outcome.residuals.largest,
-            lagged[1],
-            iterations(implicit)[1],
-            implicit.counters.linear_solves,
-            implicit.outcome.residuals.largest,
-            newton.counters.linear_solves if alone else np.nan,
-            newton.counters.contact_solves,
-            difference(implicit, newton) if alone else np.nan,
+        table.append(
+            {
+                "mu = k_e": value,
+                "thesis": thesis,
+                "Alg. 6, (3.46)": lagged[0],
+                "delta = 83.3": iterations(solution(*LAGGED, *EXACT, STEEP))[0],
+                "Alg. 6, literal": literal.history[-1].iteration if met else np.nan,
+                "residual left": literal.outcome.residuals.largest,
+                "Alg. 6, 1e-8": lagged[1],
+                "implicit, 1e-8": iterations(implicit)[1],
+                "solves": implicit.counters.linear_solves,
+                "residual": implicit.outcome.residuals.largest,
+                "Newton": newton.counters.linear_solves if alone else np.nan,
+                "at contact": newton.counters.contact_solves,
+                "difference": difference(implicit, newton) if alone else np.nan,
+            }
         )
     topic = "layer of thickness 0.1" if suffix else "as printed"
     report.table(
         f"table-8-4{suffix}",
         f"Table 8.4: iterations for mu = k_e, phi_F = 32, {topic}, {cells[0]} x {cells[1]} cells",
-        columns,
+        table,
         "Alg. 6: layer and charge lagged, inner solves to 2e-12; iterations to a relative "
         "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: r = "
         "0.25 E and the thesis's rules in both loops (— : (3.46) is not met in 400 iterations), "
@@ -148,25 +140,19 @@ def difference(a: Solution, b: Solution) -> float:
 
 def examples(report: Report, cells: tuple[int, int]) -> None:
     """Make a table of the results of Examples 8.3 and 8.4. Collective."""
-    columns = empty(
-        "example", "converged", "iterations", "solves", "residual", "in contact", "on rigid part",
-        "from x", "to x", "max u_i", "max p", "phi min", "phi max", "max |dev eps|",
-    )  # fmt: skip
-    for example, name in EXAMPLES.items():
-        solution = run(case_of(name, cells))
-        append(columns, example, *values(solution))
+    solved = {example: run(on_grid(name, cells)) for example, name in EXAMPLES.items()}
     report.table(
         "examples-8-3-8-4",
         f"Examples 8.3 and 8.4, {cells[0]} x {cells[1]} cells",
-        columns,
+        [{"example": example, **values(solution)} for example, solution in solved.items()],
         "The Uzawa block relaxation with layer and phi implicit, to residuals of 1e-8. The next "
         "section is on the thesis's two iterations of Example 8.3, which has neither friction nor "
         "charge. Nodes on the rigid part are those with a positive multiplier of the constraint.",
     )
 
 
-def values(solution: Solution) -> tuple[object, ...]:
-    """Return the columns of `examples`. Collective."""
+def values(solution: Solution) -> dict[str, object]:
+    """Return the row of an example. Collective."""
     body, interface = solution.problem.body, solution.problem.interface
     nodes, opening = interface.nodes, interface.normal_gap(solution.nodal)
     rigid = nodes.gather(solution.forces.contact - interface.c_0 * opening > 0)
@@ -175,21 +161,28 @@ def values(solution: Solution) -> tuple[object, ...]:
     unknowns = solution.state.x.reshape(-1, body.block_size)
     ends = [np.abs(unknowns[:, :-1]).max(), (-unknowns[:, -1]).max(), unknowns[:, -1].max()]
     largest = np.max(body.comm.allgather(ends), axis=0)
-    return (
-        solution.converged,
-        solution.history[-1].iteration,
-        solution.counters.linear_solves,
-        solution.outcome.residuals.largest,
-        int(touching.sum()),
-        int(rigid.sum()),
-        float(x.min()),
-        float(x.max()),
-        float(largest[0]),
-        nodes.maximum(solution.pressure),
-        float(-body.phi_scale * largest[1]),
-        float(body.phi_scale * largest[2]),
-        solution.max_dev_strain,
-    )
+    return {
+        **ended(solution),
+        "in contact": int(touching.sum()),
+        "on rigid part": int(rigid.sum()),
+        "from x": float(x.min()),
+        "to x": float(x.max()),
+        "max u_i": float(largest[0]),
+        "max p": nodes.maximum(solution.pressure),
+        "phi min": float(-body.phi_scale * largest[1]),
+        "phi max": float(body.phi_scale * largest[2]),
+        "max |dev eps|": solution.max_dev_strain,
+    }
+
+
+def ended(solution: Solution) -> dict[str, object]:
+    """Return in a row how a run has ended."""
+    return {
+        "converged": solution.converged,
+        "iterations": solution.history[-1].iteration,
+        "solves": solution.counters.linear_solves,
+        "residual": solution.outcome.residuals.largest,
+    }
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -9,16 +9,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contact import Solution, build_problem, load_case
-from contact.linear.operator import SparseOperator
-from contact.problem.problem import ContactProblem
-from contact.problem.residuals import residual_forces
+from contact import Solution, build_problem
 from contact.results.resultants import charge_balance
-from contact.thesis.uzawa import augmentation
-from scripts.cases import CASES
+from scripts.cases import on_grid
 from scripts.force_balance import force_balance
 from scripts.reporting import Report, append, empty, options
-from scripts.thesis.tables_compliance import case_of, difference, iterations, run
+from scripts.thesis.tables_compliance import difference, ended, iterations, run
+from tests.problems.piezo import first_solve
 
 PHI_F = (0, 1, 2, 4, 8, 16, 32)
 K_E = (0.0, 1e-3, 1e-2, 1e-1, 1.0)
@@ -63,39 +60,37 @@ LITERAL = (
 
 def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:
     """Make the counterpart of Table 8.2 or 8.3. Collective."""
-    columns = empty(
-        "phi_F", "thesis", "Alg. 4, (3.46)", "Alg. 4, literal", "Alg. 4, 1e-8", "implicit, (3.46)",
-        "implicit, 1e-8", "solves", "residual", "Newton", "at contact", "difference",
-    )  # fmt: skip
+    rows: list[dict[str, object]] = []
     name, counts = THESIS[number]
-    domain = build_problem(case_of(name, cells)).domain
+    domain = build_problem(on_grid(name, cells)).domain
     for phi_f, thesis in zip(PHI_F, counts, strict=True):
 
         def solution(*changes: str, phi_f: float = phi_f) -> Solution:
-            return run(case_of(name, cells, f"electric.phi_f={phi_f}", *changes), domain)
+            return run(on_grid(name, cells, f"electric.phi_f={phi_f}", *changes), domain)
 
         lagged = iterations(solution(*LAGGED, "solver.tolerance=1e-9"))
         changes = [counted(solution(*s, *BY_CHANGE)) for s in (LAGGED, SECANT)]
         implicit, newton = solution(UZAWA), solution(NEWTON)
-        append(
-            columns,
-            phi_f,
-            thesis,
-            changes[0],
-            counted(solution(*LITERAL)),
-            lagged[1],
-            changes[1],
-            iterations(implicit)[1],
-            implicit.counters.linear_solves,
-            implicit.outcome.residuals.largest,
-            newton.counters.linear_solves if newton.converged else np.nan,
-            newton.counters.contact_solves,
-            difference(implicit, newton),
+        rows.append(
+            {
+                "phi_F": phi_f,
+                "thesis": thesis,
+                "Alg. 4, (3.46)": changes[0],
+                "Alg. 4, literal": counted(solution(*LITERAL)),
+                "Alg. 4, 1e-8": lagged[1],
+                "implicit, (3.46)": changes[1],
+                "implicit, 1e-8": iterations(implicit)[1],
+                "solves": implicit.counters.linear_solves,
+                "residual": implicit.outcome.residuals.largest,
+                "Newton": newton.counters.linear_solves if newton.converged else np.nan,
+                "at contact": newton.counters.contact_solves,
+                "difference": difference(implicit, newton),
+            }
         )
     report.table(
         f"table-{number.replace('.', '-')}",
         f"Table {number}: iterations for k_e = 1, {cells[0]} x {cells[1]} cells",
-        columns,
+        rows,
         "Alg. 4: charge lagged, Kacanov's steps, inner solves to 1e-9; iterations to a relative "
         "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: r = "
         "0.25 E and the thesis's rules in both loops; — where these are not met in 60 "
@@ -115,8 +110,8 @@ def other_rho(report: Report, cells: tuple[int, int]) -> None:
         lagged, implicit, shares = [], [], []
         for rho in OTHER_RHO:
             friction = f"friction.mu.rho={rho}"
-            first = run(case_of(name, cells, friction, *LAGGED, *BY_CHANGE))
-            second = run(case_of(name, cells, friction, *SECANT, *BY_CHANGE))
+            first = run(on_grid(name, cells, friction, *LAGGED, *BY_CHANGE))
+            second = run(on_grid(name, cells, friction, *SECANT, *BY_CHANGE))
             lagged.append(counted(first))
             implicit.append(counted(second))
             shares.append(second.plastic_share)
@@ -142,20 +137,16 @@ def counted(solution: Solution) -> float:
 def series(report: Report, number: str, cells: tuple[int, int]) -> None:
     """Make a table of the rows of Figures 8.4 (b) or 8.6 (b). Collective."""
     name, _ = THESIS[number]
-    columns = empty(
-        "k_e", "converged", "iterations", "solves", "residual", "phi min", "phi max", "max u_i",
-        "max p", "max |dev eps|", "yielded share", "charge at the left", "through foundation",
-        "charge imbalance", "force imbalance",
-    )  # fmt: skip
-    domain = build_problem(case_of(name, cells)).domain
+    rows: list[dict[str, object]] = []
+    domain = build_problem(on_grid(name, cells)).domain
     for k_e in K_E:
-        solution = run(case_of(name, cells, f"electric.k_e={k_e}", NEWTON), domain)
-        append(columns, k_e, *values(solution))
+        solution = run(on_grid(name, cells, f"electric.k_e={k_e}", NEWTON), domain)
+        rows.append({"k_e": k_e, **values(solution)})
     example = {"8.2": "8.1", "8.3": "8.2"}[number]
     report.table(
         f"series-k-e-{example.replace('.', '-')}",
         f"Example {example}, load -15x, phi_F = 32: series of k_e, {cells[0]} x {cells[1]} cells",
-        columns,
+        rows,
         "Newton's method. The potentials are those on Gamma_3. Charges are integrals of D.nu; "
         "imbalances are relative to the absolute nodal charges and to the resultant forces. Only "
         "some cells at corners of the bar are strained beyond xi_0 = 1.8. The strain is singular "
@@ -163,41 +154,26 @@ def series(report: Report, number: str, cells: tuple[int, int]) -> None:
     )
 
 
-def values(solution: Solution) -> tuple[object, ...]:
-    """Return the columns of `series`. Collective."""
+def values(solution: Solution) -> dict[str, object]:
+    """Return the row of a conductivity in `series`. Collective."""
     problem, nodes, state = solution.problem, solution.problem.nodes, solution.state
     body = problem.body
     phi = body.phi_scale * solution.nodal[:, -1]
     u = state.x.reshape(-1, body.block_size)[:, : body.dim]
     charges = charge_balance(problem, state)
-    return (
-        solution.converged,
-        solution.history[-1].iteration,
-        solution.counters.linear_solves,
-        solution.outcome.residuals.largest,
-        -nodes.maximum(-phi, -np.inf),
-        nodes.maximum(phi, -np.inf),
-        max(problem.comm.allgather(float(np.abs(u).max()))),
-        nodes.maximum(solution.pressure),
-        solution.max_dev_strain,
-        solution.plastic_share,
-        charges.electrodes["left"],
-        charges.foundation,
-        charges.imbalance,
-        force_balance(problem, state).imbalance,
-    )
-
-
-def linear_iterations(problem: ContactProblem) -> int:
-    """Return the MINRES iterations of the first solve, all of Gamma_3 in contact. Collective."""
-    interface, state = problem.interface, problem.start()
-    nodal = problem.nodal(state)
-    blocks = augmentation(problem.nodes, problem.scales.c, problem.frictional)
-    blocks = blocks + interface.foundation.charge_block(nodal, np.ones(len(nodal)))
-    operator = SparseOperator(problem.body, interface.operator_nodes, solver="iterative")
-    operator.update("secant", state, interface.weighted(blocks, state.x))
-    operator.solve(-residual_forces(problem, state))
-    return operator.counters.linear_iterations
+    return {
+        **ended(solution),
+        "phi min": -nodes.maximum(-phi, -np.inf),
+        "phi max": nodes.maximum(phi, -np.inf),
+        "max u_i": max(problem.comm.allgather(float(np.abs(u).max()))),
+        "max p": nodes.maximum(solution.pressure),
+        "max |dev eps|": solution.max_dev_strain,
+        "yielded share": solution.plastic_share,
+        "charge at the left": charges.electrodes["left"],
+        "through foundation": charges.foundation,
+        "charge imbalance": charges.imbalance,
+        "force imbalance": force_balance(problem, state).imbalance,
+    }
 
 
 def iterative(report: Report, coarse: bool) -> None:
@@ -207,10 +183,9 @@ def iterative(report: Report, coarse: bool) -> None:
     columns = empty("body", "cells", "unknowns", "iterations")
     for name, meshes in (("piezo-8-1-conductive", plane), ("piezo-column", space)):
         for cells in meshes:
-            grid = f"mesh.cells=[{', '.join(map(str, cells))}]"
-            problem = build_problem(load_case(CASES / f"{name}.toml", [grid]))
-            unknowns, shown = problem.body.layout.unknowns, " x ".join(map(str, cells))
-            append(columns, name, shown, unknowns, linear_iterations(problem))
+            problem, shown = build_problem(on_grid(name, cells)), " x ".join(map(str, cells))
+            iterations, _ = first_solve(problem, compare=False)
+            append(columns, name, shown, problem.body.layout.unknowns, iterations)
     report.table(
         "piezo-linear-iterations",
         "MINRES iterations to 1e-10: diag(GAMG, hypre) on displacement and potential",

@@ -7,9 +7,12 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Body, Conductor, Contact, Fixed, Friction, Load
+from contact.linear.operator import SparseOperator
 from contact.mesh.grid import box, rectangle
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
 from contact.problem.state import State
+from contact.thesis.uzawa import augmentation
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import (
@@ -177,3 +180,24 @@ def potential(problem: ContactProblem, state: State) -> Array:
     """Return the potential at the owned contact nodes."""
     nodal = problem.nodal(state)
     return problem.body.phi_scale * nodal[:, -1]
+
+
+def first_solve(problem, symmetric=True, compare=True):
+    """Return the iterations of a first linear solve, and its difference to the direct one."""
+    interface, state = problem.interface, problem.start()
+    nodal = problem.nodal(state)
+    blocks = augmentation(problem.nodes, problem.scales.c, problem.frictional)
+    blocks = blocks + interface.foundation.charge_block(nodal, np.ones(nodal.shape[0]))
+    blocks = interface.weighted(blocks, state.x)
+    found = []
+    for kind in ("lu", "iterative") if compare else ("iterative",):
+        operator = SparseOperator(
+            problem.body, interface.operator_nodes, symmetric=symmetric, solver=kind
+        )
+        operator.update("secant", state, blocks)
+        increment = operator.solve(-residual_forces(problem, state))
+        found.append((increment, operator.counters.linear_iterations))
+    comm = problem.comm
+    size = comm.allreduce(np.abs(found[0][0]).max(initial=0), MPI.MAX)
+    wrong = comm.allreduce(np.abs(found[0][0] - found[-1][0]).max(initial=0), MPI.MAX)
+    return found[-1][1], wrong / size

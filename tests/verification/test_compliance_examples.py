@@ -14,7 +14,7 @@ from contact.model.formula import Expression
 from contact.problem.problem import ContactProblem
 from contact.results.contact_nodes import contact_table
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient
-from scripts.cases import CASES, TABLE_8_4
+from scripts.cases import CASES, TABLE_8_4, on_grid
 from scripts.studies import limit_theorem
 from scripts.thesis import figures_compliance, tables_compliance
 from tests.problems.everywhere import agree
@@ -233,7 +233,7 @@ def test_example_8_4_with_a_steep_ramp_is_as_symmetric_as_its_mesh(diagonal, lea
 def test_iterations_are_counted_where_the_residual_ends_the_run():
     changes = "friction.mu=1.4e-5", "electric.k_e=1.4e-5"
     # Its only frictional iteration moves the bound by more than (3.46) allows.
-    case = tables_compliance.case_of("compliance-8-4", (24, 4), *changes, "solver.tolerance=1e-9")
+    case = on_grid("compliance-8-4", (24, 4), *changes, "solver.tolerance=1e-9")
     solution = tables_compliance.run(case)
     last = solution.history[-1]
     assert solution.converged

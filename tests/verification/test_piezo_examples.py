@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.linear.operator import SparseOperator
 from contact.methods.options import FixedPointOptions
 from contact.model.friction import Friction
-from contact.problem.residuals import residual_forces
 from contact.results.resultants import charge_balance
 from contact.thesis.fixed_point import FixedPoint
-from contact.thesis.uzawa import augmentation
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests.problems.everywhere import agree
 from tests.problems.mechanics import solve
-from tests.problems.piezo import Column, example, hencky, potential
+from tests.problems.piezo import Column, example, first_solve, hencky, potential
 
 COMM = MPI.COMM_WORLD
 SLIP = Friction(SlipCoefficient(0.5, 0.2, 1.0))
@@ -109,27 +106,6 @@ def test_ranks_agree(law):
 
 
 # The iterative solver
-
-
-def first_solve(problem, symmetric=True, compare=True):
-    """Return the iterations of a first linear solve, and its difference to the direct one."""
-    interface, state = problem.interface, problem.start()
-    nodal = problem.nodal(state)
-    blocks = augmentation(problem.nodes, problem.scales.c, problem.frictional)
-    blocks = blocks + interface.foundation.charge_block(nodal, np.ones(nodal.shape[0]))
-    blocks = interface.weighted(blocks, state.x)
-    found = []
-    for kind in ("lu", "iterative") if compare else ("iterative",):
-        operator = SparseOperator(
-            problem.body, interface.operator_nodes, symmetric=symmetric, solver=kind
-        )
-        operator.update("secant", state, blocks)
-        increment = operator.solve(-residual_forces(problem, state))
-        found.append((increment, operator.counters.linear_iterations))
-    comm = problem.comm
-    size = comm.allreduce(np.abs(found[0][0]).max(initial=0), MPI.MAX)
-    wrong = comm.allreduce(np.abs(found[0][0] - found[-1][0]).max(initial=0), MPI.MAX)
-    return found[-1][1], wrong / size
 
 
 @pytest.mark.core

@@ -29,11 +29,10 @@ from contact.methods.report import Outcome
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.residuals import evaluate
 from scripts.benchmarks import bench_one
-from scripts.cases import CASES
+from scripts.cases import CASES, on_grid
 from scripts.reporting import Report, append, empty, parser
 from scripts.studies.robustness.one_body import Tables, case, clamp, elastic, grid, sliding
 from scripts.studies.robustness.problems import Problem, problems
-from scripts.thesis.tables_compliance import case_of
 from tests.methods.test_belt import wall
 from tests.methods.test_nothing_touches import unloaded
 from tests.methods.test_slender import TIP, UNIFORM, beam
@@ -65,7 +64,7 @@ def layer() -> Tables:
 def steep(cells: tuple[int, int] = (96, 16), k_e: str = "0.6", delta: str = "83.3333") -> Case:
     """Return Example 8.4 with a steep ramp of the conductivity."""
     changes = "solver.method=newton", f"electric.k_e={k_e}", f"electric.delta={delta}"
-    return case_of("compliance-8-4", cells, *changes)
+    return on_grid("compliance-8-4", cells, *changes)
 
 
 def pulled_strip() -> Tables:
