@@ -171,14 +171,14 @@ def of_example(name: str) -> dict[str, Value]:
     return {**measured(solution), **compared}
 
 
-def of(make: Callable[[], Case | Problem], **options: Any) -> dict[str, Value]:
+def of(given: Case | Problem, **options: Any) -> dict[str, Value]:
     """Solve a case, or a problem that is put together in Python. Collective."""
-    return measured(solve(make(), NewtonOptions(tolerance=TIGHT, **options)))
+    return measured(solve(given, NewtonOptions(tolerance=TIGHT, **options)))
 
 
-def in_steps(make: Callable[[], Problem], times: Iterable[float]) -> dict[str, Value]:
+def in_steps(problem: Problem, times: Iterable[float]) -> dict[str, Value]:
     """Solve a problem in load steps. Collective."""
-    return measured(solve_steps(make(), [*times], NewtonOptions(tolerance=TIGHT)))
+    return measured(solve_steps(problem, [*times], NewtonOptions(tolerance=TIGHT)))
 
 
 def of_case_itself(case: Case) -> dict[str, Value]:
@@ -249,7 +249,7 @@ def unlike() -> dict[str, Value]:
             "contact": {"on": "under", "against": "over"},
             "friction": {"law": "coulomb", "mu": 0.3},
         }
-        return of(lambda: parse_case(case))
+        return of(parse_case(case))
 
 
 def squares(cell: str, element: str = "standard", poisson: float = 0.3) -> Problem:
@@ -364,7 +364,7 @@ def block_in_steps() -> dict[str, Value]:
     law = materials.LAWS["norm"]
     block = mechanics.SlidingBlock(law, mechanics.SlipCoefficient(0.3, 0.2, 50.0), 0.02, 0.0, 0.0)
     given = stepped.SteppedBlock(block, stepped.back_and_forth(0.03, 0.01))
-    return in_steps(lambda: given.problem(COMM), given.times)
+    return in_steps(given.problem(COMM), given.times)
 
 
 def derivatives(method: str) -> dict[str, Value]:
@@ -407,154 +407,126 @@ def interior_point() -> dict[str, Value]:
 #: Problems in Python: name -> values.
 IN_PYTHON: Mapping[str, Callable[[], dict[str, Value]]] = {
     "blocks apart": lambda: of(
-        lambda: apart.pressed(apart.blocks(COMM), 0.01, 0.02, gap=0.0), condense=True
+        apart.pressed(apart.blocks(COMM), 0.01, 0.02, gap=0.0), condense=True
     ),
-    "pair, triangles": partial(of, pair),
-    "pair, sparse": partial(of, pair, condense=False),
-    "pair, multigrid": partial(of, pair, condense=False, linear="iterative"),
-    "pair, turned": partial(of, partial(pair, turn=20.0)),
-    "pair, degree 2": partial(of, partial(pair, 2)),
-    "pair, curved": partial(of, partial(pair, 2, bow=0.03)),
-    "pair, squares": partial(of, partial(pair, cell="quadrilateral")),
-    "pair, tetrahedra": partial(of, partial(pair, dim=3, upper=2, lower=3)),
-    "pair, tetrahedra, degree 2": partial(of, partial(pair, 2, dim=3, upper=2, lower=2)),
-    "pair, hexahedra": partial(of, partial(pair, dim=3, upper=2, lower=3, cell="hexahedron")),
+    "pair, triangles": lambda: of(pair()),
+    "pair, sparse": lambda: of(pair(), condense=False),
+    "pair, multigrid": lambda: of(pair(), condense=False, linear="iterative"),
+    "pair, turned": lambda: of(pair(turn=20.0)),
+    "pair, degree 2": lambda: of(pair(2)),
+    "pair, curved": lambda: of(pair(2, bow=0.03)),
+    "pair, squares": lambda: of(pair(cell="quadrilateral")),
+    "pair, tetrahedra": lambda: of(pair(dim=3, upper=2, lower=3)),
+    "pair, tetrahedra, degree 2": lambda: of(pair(2, dim=3, upper=2, lower=2)),
+    "pair, hexahedra": lambda: of(pair(dim=3, upper=2, lower=3, cell="hexahedron")),
     "pair, unlike cells": unlike,
-    "pair, generator": lambda: of(lambda: parse_case(pairs.case())),
-    "squares": partial(of, partial(squares, "quadrilateral")),
-    "squares, mean dilatation": partial(
-        of, partial(squares, "quadrilateral", "mean_dilatation", 0.4999)
-    ),
-    "hexahedra": partial(of, partial(squares, "hexahedron")),
-    "hexahedra, mean dilatation": partial(
-        of, partial(squares, "hexahedron", "mean_dilatation", 0.4999)
-    ),
+    "pair, generator": lambda: of(parse_case(pairs.case())),
+    "squares": lambda: of(squares("quadrilateral")),
+    "squares, mean dilatation": lambda: of(squares("quadrilateral", "mean_dilatation", 0.4999)),
+    "hexahedra": lambda: of(squares("hexahedron")),
+    "hexahedra, mean dilatation": lambda: of(squares("hexahedron", "mean_dilatation", 0.4999)),
     **{
-        f"layer, {regime}": partial(of, partial(column.problem, dim))
+        f"layer, {regime}": lambda dim=dim, column=column: of(column.problem(dim))
         for (regime, column), dim in zip(compliance.REGIMES.items(), (2, 3, 2, 3), strict=True)
     },
     **{
-        f"layer, piezo, {regime}": partial(of, partial(column.problem, dim))
+        f"layer, piezo, {regime}": lambda dim=dim, column=column: of(column.problem(dim))
         for (regime, column), dim in zip(
             compliance.PIEZO_REGIMES.items(), (2, 3, 2, 3), strict=True
         )
     },
     **{
-        f"law, {name}": partial(of, partial(mechanics.bar, COMM, 4, -0.05, law=law))
+        f"law, {name}": lambda law=law: of(mechanics.bar(COMM, 4, -0.05, law=law))
         for name, law in materials.LAWS.items()
     },
-    "leaning block": partial(of, partial(mechanics.leaning_block, COMM)),
-    "leaning block, degree 2": partial(of, partial(mechanics.leaning_block, COMM, 2, 2)),
-    "pressed block": partial(of, partial(mechanics.pressed_block, COMM, 3, gap=0.01)),
-    "column, 2-D": partial(of, partial(piezo.Column(k_e=1.0, phi_f=32.0).problem, COMM, 2)),
-    "column, 3-D, degree 2": partial(
-        of, partial(piezo.Column(k_e=1.0, phi_f=32.0).problem, COMM, 3, degree=2, mu=0.2)
+    "leaning block": lambda: of(mechanics.leaning_block(COMM)),
+    "leaning block, degree 2": lambda: of(mechanics.leaning_block(COMM, 2, 2)),
+    "pressed block": lambda: of(mechanics.pressed_block(COMM, 3, gap=0.01)),
+    "column, 2-D": lambda: of(piezo.Column(k_e=1.0, phi_f=32.0).problem(COMM, 2)),
+    "column, 3-D, degree 2": lambda: of(
+        piezo.Column(k_e=1.0, phi_f=32.0).problem(COMM, 3, degree=2, mu=0.2)
     ),
-    "column, perfect, turned": partial(
-        of, partial(piezo.Column(k_e=1.0, phi_f=32.0).problem, COMM, 2, perfect=True, degrees=20.0)
+    "column, perfect, turned": lambda: of(
+        piezo.Column(k_e=1.0, phi_f=32.0).problem(COMM, 2, perfect=True, degrees=20.0)
     ),
-    "piezo, 3-D": partial(
-        of, partial(piezo.example, COMM, (6, 2, 3), friction=Friction(mu=0.2), delta=1.0)
-    ),
-    "piezo, Hencky": partial(
-        of,
-        lambda: piezo.example(
+    "piezo, 3-D": lambda: of(piezo.example(COMM, (6, 2, 3), friction=Friction(mu=0.2), delta=1.0)),
+    "piezo, Hencky": lambda: of(
+        piezo.example(
             COMM, (16, 8), law=piezo.hencky(), friction=Friction(mu=0.2), delta=1.0, limit=8.0
-        ),
-    ),
-    "j2, plane": lambda: of(lambda: _cyclic("plane", kinematic=20.0)),
-    "j2, uniaxial": lambda: of(
-        lambda: _cyclic("uniaxial", hardening={"saturation": 0.3, "rate": 20.0})
-    ),
-    "j2, revolved": lambda: of(
-        lambda: _cyclic(
-            "revolved", kinematic=[{"modulus": 50.0, "recovery": 20.0}], hardening=2.0
         )
+    ),
+    "j2, plane": lambda: of(_cyclic("plane", kinematic=20.0)),
+    "j2, uniaxial": lambda: of(_cyclic("uniaxial", hardening={"saturation": 0.3, "rate": 20.0})),
+    "j2, revolved": lambda: of(
+        _cyclic("revolved", kinematic=[{"modulus": 50.0, "recovery": 20.0}], hardening=2.0)
     ),
     "j2, oedometer": lambda: of(
-        lambda: _cyclic("oedometer-space", hardening=[[0.0, 0.2], [0.01, 0.3], [0.1, 0.4]])
+        _cyclic("oedometer-space", hardening=[[0.0, 0.2], [0.01, 0.3], [0.1, 0.4]])
     ),
-    "put together": partial(of, put_together.problem),
-    "tube": partial(of, partial(revolution.Tube().problem, 6)),
-    "tube, mean dilatation": partial(
-        of,
-        partial(
-            revolution.Tube(Linear(1.0, 0.4999)).problem, 6, 2, element="mean_dilatation"
-        ),
+    "put together": lambda: of(put_together.problem()),
+    "tube": lambda: of(revolution.Tube().problem(6)),
+    "tube, mean dilatation": lambda: of(
+        revolution.Tube(Linear(1.0, 0.4999)).problem(6, 2, element="mean_dilatation")
     ),
-    "tubes, two bodies": partial(of, partial(revolution.Layers().problem, 6, 1, 2)),
-    "tubes, two bodies, degree 2": partial(of, partial(revolution.Layers().problem, 6, 2, 2)),
-    "drum": partial(of, partial(revolution.Drum().problem, 6)),
-    "cylinder, R": partial(of, partial(revolution.pressed_cylinder, COMM, radius=0.3)),
-    "cylinder, degree 2": partial(of, partial(revolution.pressed_cylinder, COMM, degree=2)),
-    "indented": partial(
-        of,
-        partial(
-            rigid.indented, 2, displacement=[0.0, "free"], force=[0.0, -0.05],
-            rotation="free", moment=0.001,
-        ),
+    "tubes, two bodies": lambda: of(revolution.Layers().problem(6, 1, 2)),
+    "tubes, two bodies, degree 2": lambda: of(revolution.Layers().problem(6, 2, 2)),
+    "drum": lambda: of(revolution.Drum().problem(6)),
+    "cylinder, R": lambda: of(revolution.pressed_cylinder(COMM, radius=0.3)),
+    "cylinder, degree 2": lambda: of(revolution.pressed_cylinder(COMM, degree=2)),
+    "indented": lambda: of(
+        rigid.indented(
+            2, displacement=[0.0, "free"], force=[0.0, -0.05], rotation="free", moment=0.001
+        )
     ),
-    "indented, 3-D": partial(
-        of,
-        partial(
-            rigid.indented, 3, 4, displacement=[0.01, 0.0, "free"], force=[0.0, 0.0, -0.05],
-        ),
+    "indented, 3-D": lambda: of(
+        rigid.indented(3, 4, displacement=[0.01, 0.0, "free"], force=[0.0, 0.0, -0.05])
     ),
-    "plate": partial(of, rigid.plate),
-    "electrode": partial(of, rigid.column),
+    "plate": lambda: of(rigid.plate()),
+    "electrode": lambda: of(rigid.column()),
     "ring": ring,
-    "shaken": lambda: in_steps(partial(shaken.shaken, comm=COMM), shaken.times(2)),
+    "shaken": lambda: in_steps(shaken.shaken(comm=COMM), shaken.times(2)),
     "shaken, Hencky, degree 2": lambda: in_steps(
-        partial(shaken.shaken, materials.LAWS["norm"], 2, comm=COMM), shaken.times(1)
+        shaken.shaken(materials.LAWS["norm"], 2, comm=COMM), shaken.times(1)
     ),
     "stepped": block_in_steps,
-    "written": partial(of, partial(written.block, 2)),
-    "written, degree 2": partial(of, partial(written.block, 2, 2)),
-    "written, 3-D": partial(of, partial(written.block, 3)),
-    "written, electric": partial(of, partial(written.electric, 2)),
-    "written, electric, 3-D": partial(of, partial(written.electric, 3)),
-    "crystal, 2-D": partial(of, partial(crystal, 2, False)),
-    "crystal, 3-D": partial(of, partial(crystal, 3, False)),
-    "crystal, piezo": partial(of, partial(crystal, 2, True)),
-    "bolt": partial(of, bolt),
-    "bed": partial(of, bed),
-    "shape, sphere": partial(
-        of, partial(shape, shape="sphere", centre=[0.0, 0.0, 1.0], radius=1.0)
-    ),
-    "shape, punch": partial(
-        of,
-        partial(
-            shape, shape="punch", centre=[0.03, 0.02, 0.0], axis=[0.0, 0.0, 1.0], radius=0.6,
+    "written": lambda: of(written.block(2)),
+    "written, degree 2": lambda: of(written.block(2, 2)),
+    "written, 3-D": lambda: of(written.block(3)),
+    "written, electric": lambda: of(written.electric(2)),
+    "written, electric, 3-D": lambda: of(written.electric(3)),
+    "crystal, 2-D": lambda: of(crystal(2, False)),
+    "crystal, 3-D": lambda: of(crystal(3, False)),
+    "crystal, piezo": lambda: of(crystal(2, True)),
+    "bolt": lambda: of(bolt()),
+    "bed": lambda: of(bed()),
+    "shape, sphere": lambda: of(shape(shape="sphere", centre=[0.0, 0.0, 1.0], radius=1.0)),
+    "shape, punch": lambda: of(
+        shape(
+            shape="punch",
+            centre=[0.03, 0.02, 0.0],
+            axis=[0.0, 0.0, 1.0],
+            radius=0.6,
             edge_radius=0.2,
-        ),
+        )
     ),
-    "shape, cylinder": partial(
-        of,
-        partial(
-            shape, shape="cylinder", point=[0.0, 0.0, 1.5], axis=[1.0, 0.2, 0.0], radius=1.5
-        ),
+    "shape, cylinder": lambda: of(
+        shape(shape="cylinder", point=[0.0, 0.0, 1.5], axis=[1.0, 0.2, 0.0], radius=1.5)
     ),
-    "shape, cone": partial(
-        of,
-        partial(
-            shape, shape="cone", apex=[0.03, 0.02, 0.0], axis=[0.0, 0.0, 1.0], half_angle=80.0
-        ),
+    "shape, cone": lambda: of(
+        shape(shape="cone", apex=[0.03, 0.02, 0.0], axis=[0.0, 0.0, 1.0], half_angle=80.0)
     ),
-    "shape, distance": partial(
-        of,
-        partial(shape, shape="distance", distance="sqrt(x**2 + 2*y**2 + (z - 1)**2) - 1"),
+    "shape, distance": lambda: of(
+        shape(shape="distance", distance="sqrt(x**2 + 2*y**2 + (z - 1)**2) - 1")
     ),
     "Tresca": lambda: of(
-        lambda: parse_case(
-            tables.changed(friction={"law": "tresca", "bound": "0.0003*x"}, solver=None)
-        )
+        parse_case(tables.changed(friction={"law": "tresca", "bound": "0.0003*x"}, solver=None))
     ),
     "mu(p)": mu_of_pressure,
     "interior point": interior_point,
     "derivatives, tangent": partial(derivatives, "tangent"),
     "derivatives, adjoint": partial(derivatives, "adjoint"),
     "derivatives of charge": derivatives_of_charge,
-}  # fmt: skip
+}
 
 
 def _cyclic(kind: str, **material: Any) -> Case:
@@ -619,7 +591,7 @@ THESIS: Mapping[str, Callable[[], dict[str, Value]]] = {
     },
     **{
         f"Figure {number}": partial(
-            of, partial(bar, 8, load, 1e4, "output.fields=none")
+            of, bar(8, load, 1e4, "output.fields=none")
         )
         for number, load in (("7.4", -0.005), ("7.5", -0.05))
     },
