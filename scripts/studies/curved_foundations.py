@@ -218,17 +218,21 @@ def _write(profiles: Sequence[Profile], h: float, dim: int, path: str, order: in
         for behind, profile in zip(("", "1"), profiles, strict=False):
             sides, face = _outline(model, profile, dim)
             if dim == 3:
-                # A surface is swept from a side; on the axis there is none.
-                swept = model.revolve([(2, face)], 0, 0, 0, 0, 0, 1, np.pi / 2)
-                model.synchronize()
-                body += [tag for d, tag in swept if d == 3]
-                parts = _surfaces(gmsh, profile, body)
-                continue
+                (_, end), (_, solid), *swept = model.revolve([(2, face)], *[0] * 5, 1, np.pi / 2)
+                parts = {"x": [end], "y": [face]}
+                # A surface is swept from each side, in their order; from the axis none.
+                surfaces = iter(tag for _, tag in swept)
+                radii = np.array(profile.points)[:, 0]
+                on_axis = (radii == 0) & (np.roll(radii, -1) == 0)
+                tags = [[] if on else [next(surfaces)] for on in on_axis]
+            else:
+                solid, tags = face, [[side] for side in sides]
             model.synchronize()
-            body.append(face)
+            body.append(solid)
             groups = {"contact": profile.contact, "held": profile.held}
             groups |= {f"side{k}": [k] for k in range(len(sides))}
-            parts |= {name + behind: [sides[k] for k in of] for name, of in groups.items()}
+            for name, of in groups.items():
+                parts[name + behind] = [tag for k in of for tag in tags[k]]
             if behind:
                 # The two sides of a pair do not match.
                 length = model.getMass(1, sides[profile.contact[0]])
@@ -280,43 +284,6 @@ def _outline(model: Any, profile: Profile, dim: int) -> tuple[list[int], int]:
         inner = [model.addPoint(*((x, 0, y) if dim == 3 else (x, y, 0))) for x, y in way]
         sides.append(model.addSpline([first, *inner, last]))
     return sides, model.addPlaneSurface([model.addCurveLoop(sides)])
-
-
-def _surfaces(gmsh: Any, profile: Profile, body: Sequence[int]) -> dict[str, list[int]]:
-    """Return the surfaces swept from sides, told by points of them, and the planes x, y = 0."""
-    found: dict[str, list[int]] = {"contact": [], "held": [], "x": [], "y": []}
-    corners = np.array(profile.points)
-    count = len(corners)
-    found |= {f"side{k}": [] for k in range(count)}
-    for _, tag in gmsh.model.getBoundary([(3, b) for b in body], oriented=False):
-        low, high = np.array(gmsh.model.getBoundingBox(2, tag)).reshape(2, 3)
-        flat = [k for k in range(2) if max(abs(low[k]), abs(high[k])) < 1e-4]
-        if flat:
-            found["xy"[flat[0]]].append(tag)
-            continue
-        # Of a planar surface the bounds of the parameters are far wider than it.
-        if high[2] - low[2] < 1e-4:
-            x = np.array(gmsh.model.occ.getCenterOfMass(2, tag))
-        else:
-            (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(2, tag)
-            x = np.array(gmsh.model.getValue(2, tag, [(u0 + u1) / 2, (v0 + v1) / 2]))
-        at = np.array([np.hypot(*x[:2]), x[2]])
-        away = [_away(profile, k, at) for k in range(count)]
-        k = int(np.argmin(away))
-        found[f"side{k}"].append(tag)
-        for name, of in (("contact", profile.contact), ("held", profile.held)):
-            if k in of:
-                found[name].append(tag)
-    return found
-
-
-def _away(profile: Profile, k: int, at: Array) -> float:
-    if k in profile.arcs:
-        centre, axes = profile.arcs[k]
-        return abs(float(np.linalg.norm((at - centre) / axes)) - 1)
-    a, b = (np.array(profile.points[(k + j) % len(profile.points)]) for j in range(2))
-    part = np.clip((at - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
-    return float(np.linalg.norm(at - a - part * (b - a)))
 
 
 def hydrostatic(name: str, h: float, degree: int, kind: str, order: int = 1) -> Array:
