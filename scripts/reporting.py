@@ -59,6 +59,14 @@ class Report:
 
     #: The folder; it is made if need be.
     out: Path
+    #: Whether coarse meshes are asked for: quick, for tests.
+    coarse: bool = False
+
+    @classmethod
+    def of(cls, text: str, script: str, arguments: Sequence[str] | None = None) -> Report:
+        """Return what --out and --coarse ask for, the options that all these scripts have."""
+        given = parser(text, script).parse_args(arguments)
+        return cls(given.out, given.coarse)
 
     def table(self, name: str, caption: str, given: Table, note: str = "") -> None:
         """Print a table and write it."""
@@ -167,11 +175,6 @@ def subplots(
     """Return a figure and its axes, in the style of `contact.plot`."""
     figure = Figure(figsize=size)
     return figure, figure.subplots(rows, columns, **shared)
-
-
-def options(text: str, script: str, arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """Return the options --out and --coarse, which all these scripts have."""
-    return parser(text, script).parse_args(arguments)
 
 
 def parser(text: str, script: str) -> argparse.ArgumentParser:

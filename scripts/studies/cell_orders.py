@@ -172,7 +172,7 @@ def _squares(
     return l2_error(problem, state.x, displacement, above) ** 2, off[0] ** 2, off[1] ** 2
 
 
-def orders(report: Report, coarse: bool) -> dict[tuple[str, str, int, int], Array]:
+def orders(report: Report) -> dict[tuple[str, str, int, int], Array]:
     """Make the table of errors; return the orders by problem, cells, and both degrees."""
     keys = "problem", "cells", "geometry", "degree", "n", "unknowns"
     names = "u in L2", "p in L2", "p in H^-1/2"
@@ -182,7 +182,7 @@ def orders(report: Report, coarse: bool) -> dict[tuple[str, str, int, int], Arra
     for name, (kind, dim, above) in KNOWN.items():
         for shape in (shape for shape in SHAPES if shape.dim == dim):
             for order, degree in ELEMENTS:
-                counts, rows = CELLS[dim, degree][: 2 if coarse else None], []
+                counts, rows = CELLS[dim, degree][: 2 if report.coarse else None], []
                 for n in counts:
                     domain = grid(MPI.COMM_WORLD, shape.name, order, n)
                     squares = [_squares(kind(x), domain, degree, above) for x in places(n)]
@@ -226,12 +226,12 @@ def _measured(make: Callable[[int], tuple[ContactProblem, Any]], n: int) -> tupl
     return norms[0] / norms[1], seconds, problem.body.layout.unknowns
 
 
-def times(report: Report, coarse: bool) -> dict[tuple[str, str, int, int], float]:
+def times(report: Report) -> dict[tuple[str, str, int, int], float]:
     """Make the table of times to 1 %; return the unknowns by problem, cells and degrees."""
     columns = empty("problem", "cells", "geometry", "degree", "n", "unknowns", "error", "seconds")
     found = {}
     makes = (("ring on a shaft", _ring), ("root-like", _root))
-    asked = 5 * ASKED if coarse else ASKED
+    asked = 5 * ASKED if report.coarse else ASKED
     for name, make in makes:
         for shape in (shape for shape in SHAPES if shape.dim == 2):
             for order, degree in ELEMENTS:

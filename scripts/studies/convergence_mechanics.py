@@ -13,7 +13,7 @@ from contact import NotConvergedError
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
-from scripts.reporting import Report, empty, observed_orders, options
+from scripts.reporting import Report, empty, observed_orders
 from scripts.studies.corner import POISSON, exponent
 from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import Singular, exact, manufactured
@@ -21,10 +21,10 @@ from scripts.studies.fixed_point_rates import fixed_points
 from scripts.studies.mesh_series import NORMS, Variant, mesh_series
 
 
-def figure_7_6(report: Report, coarse: bool) -> dict[str, Array]:
+def figure_7_6(report: Report) -> dict[str, Array]:
     """Make the counterpart of Figure 7.6. Collective."""
     small, large = -0.005, -0.05
-    if coarse:
+    if report.coarse:
         variants = [
             Variant("P1, f2 = -0.005", small, 1, (4, 8, 16), 64),
             Variant("P2, f2 = -0.005", small, 2, (4, 8), 32),
@@ -52,12 +52,12 @@ def figure_7_6(report: Report, coarse: bool) -> dict[str, Array]:
     )
 
 
-def graded_meshes(report: Report, coarse: bool) -> dict[str, Array]:
+def graded_meshes(report: Report) -> dict[str, Array]:
     """Show the orders on meshes graded towards the corners. Collective."""
     load, power = -0.005, exponent(POISSON)
     series: tuple[tuple[int, tuple[float, ...], tuple[int, ...], int], ...]
     series = ((1, (1.0, 1.5), (4, 8, 16), 128), (2, (1.0, 3.0), (2, 4, 8), 64))
-    if coarse:
+    if report.coarse:
         series = ((1, (1.0, 1.5), (4, 8), 32),)
     variants = [
         Variant(f"P{degree}, power {q:g}", load, degree, cells, reference, power=q)
@@ -80,9 +80,9 @@ def graded_meshes(report: Report, coarse: bool) -> dict[str, Array]:
     )
 
 
-def theorem_4_3(report: Report, coarse: bool) -> dict[str, Array]:
+def theorem_4_3(report: Report) -> dict[str, Array]:
     """Show the penalised solution converge as h -> 0 at fixed eps. Collective."""
-    cells, reference = ((4, 8), 32) if coarse else ((8, 16, 32), 128)
+    cells, reference = ((4, 8), 32) if report.coarse else ((8, 16, 32), 128)
     variants = [
         Variant(
             f"eps = {eps:g}",
@@ -104,9 +104,9 @@ def theorem_4_3(report: Report, coarse: bool) -> dict[str, Array]:
     )
 
 
-def known_solutions(report: Report, coarse: bool) -> dict[str, Array]:
+def known_solutions(report: Report) -> dict[str, Array]:
     """Tabulate the errors of problems with a known solution. Collective."""
-    levels = 3 if coarse else 4
+    levels = 3 if report.coarse else 4
     singular = Singular()
     names = ("problem", "1/h", "L2", "order (L2)", "H1", "order (H1)", "energy", "order (energy)")
     names = (*names, "largest", "order", "residual")
@@ -157,13 +157,9 @@ def known_solutions(report: Report, coarse: bool) -> dict[str, Array]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make all tables and figures."""
-    chosen = options(__doc__, "convergence_mechanics", arguments)
-    report = Report(chosen.out)
-    known_solutions(report, chosen.coarse)
-    fixed_points(report, chosen.coarse)
-    theorem_4_3(report, chosen.coarse)
-    figure_7_6(report, chosen.coarse)
-    graded_meshes(report, chosen.coarse)
+    report = Report.of(__doc__, "convergence_mechanics", arguments)
+    for make in (known_solutions, fixed_points, theorem_4_3, figure_7_6, graded_meshes):
+        make(report)
 
 
 if __name__ == "__main__":

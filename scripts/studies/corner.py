@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from scripts.cases import bar
-from scripts.reporting import Report, empty, observed_orders, options, solved
+from scripts.reporting import Report, empty, observed_orders, solved
 
 #: Poisson's ratio and decay of (7.16) of Example 7.2.
 POISSON, RHO = 0.3, 1e4
@@ -34,11 +34,11 @@ def exponent(poisson: float, angle: float = np.pi / 2) -> float:
 
 def main(arguments: Sequence[str] | None = None) -> list[float]:
     """Make the table; return the fitted exponents. Collective."""
-    chosen = options(__doc__, "corner", arguments)
+    report = Report.of(__doc__, "corner", arguments)
     columns = empty(
         "1/h", "status", "pressure at (4, 0)", "lambda, fitted", "lambda, theory", "residual",
     )  # fmt: skip
-    cells, pressures = (8, 16, 32) if chosen.coarse else (16, 32, 64, 128), []
+    cells, pressures = (8, 16, 32) if report.coarse else (16, 32, 64, 128), []
     for n in cells:
         solution = solved(bar(n, -0.005, RHO))
         nodes = solution.problem.nodes
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> list[float]:
     columns["pressure at (4, 0)"] = list(pressures)
     columns["lambda, fitted"] = list(fitted)
     columns["lambda, theory"] = [theory] * len(cells)
-    Report(chosen.out).table(
+    report.table(
         "corner",
         "Exponent of the singular corner (4, 0) of Example 7.2, f2 = -0.005, rho = 1e4",
         columns,

@@ -16,7 +16,7 @@ from contact import Body, Contact, Cylinder, Domain, Fixed, Linear, Load, Sphere
 from contact.mesh.cells import SHAPES
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import Report, append, empty, observed_orders, options
+from scripts.reporting import Report, append, empty, observed_orders
 from scripts.studies import cell_orders
 from scripts.studies.lame_rings import Lame, error, rings
 
@@ -92,11 +92,11 @@ def problem_of(kind: str, cell: str, order: int, degree: int, n: int) -> Contact
     return two_rings(domain, degree)
 
 
-def rim(report: Report, coarse: bool) -> dict[str, float]:
+def rim(report: Report) -> dict[str, float]:
     """Make the table of tetrahedra on a shaft; return the last orders."""
     columns = empty("across", "unknowns")
     last = {}
-    for n in (2, 4) if coarse else (4, 8, 12):
+    for n in (2, 4) if report.coarse else (4, 8, 12):
         domain = rings(MPI.COMM_WORLD, "tetrahedron", 2, (1.0, 2.0), (n,))
         columns["across"].append(n)
         for kind, make in (("shaft", on_a_shaft), ("load", under_pressure)):
@@ -113,7 +113,7 @@ def rim(report: Report, coarse: bool) -> dict[str, float]:
 
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, int], float]:
     """Make the table; return the last orders by problem, cell, and the degrees of both."""
-    chosen = options(__doc__, "curved_cells", arguments)
+    report = Report.of(__doc__, "curved_cells", arguments)
     columns = empty(
         "problem", "cells", "geometry", "degree", "across", "unknowns", "error", "order",
         "pressure",
@@ -124,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, in
         ("two rings", -float(LAME.radial(np.array(1.5)))),
     ):
         for shape in SHAPES:
-            counts = CELLS[shape.dim][: 2 if chosen.coarse else None]
+            counts = CELLS[shape.dim][: 2 if report.coarse else None]
             for order, degree in ELEMENTS:
                 last = None
                 for n in counts:
@@ -139,11 +139,10 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, in
                     print(*row, f"{off:.1e}", flush=True)
                     if rate is not None:
                         orders[kind, shape.name, order, degree] = rate
-    report = Report(chosen.out)
     report.table("curved-cells", CAPTION, columns, NOTE)
-    rim(report, chosen.coarse)
-    cell_orders.orders(report, chosen.coarse)
-    cell_orders.times(report, chosen.coarse)
+    rim(report)
+    cell_orders.orders(report)
+    cell_orders.times(report)
     return orders
 
 

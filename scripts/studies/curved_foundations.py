@@ -45,7 +45,7 @@ from contact.mesh.domain import revolved
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options, solved
+from scripts.reporting import Report, append, empty, solved
 
 YOUNG, POISSON = 1000.0, 0.3
 
@@ -407,23 +407,23 @@ def _of(name: str, kind: str, h: float, degree: int, order: int = 1) -> Array:
 
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, float, int, int], Array]:
     """Make the table; return mean, least and largest ratio of each problem. Collective."""
-    chosen = options(__doc__, "curved_foundations", arguments)
+    report = Report.of(__doc__, "curved_foundations", arguments)
     columns = empty(
         "problem", "kind", "h", "degree", "geometry", "nodes", "mean", "least", "largest", "off"
     )
     found = {}
-    for name, kind, sizes, measured in series(chosen.coarse):
+    for name, kind, sizes, measured in series(report.coarse):
         for degree, order in ELEMENTS:
             if order > 1 and measured is hertz:
                 continue
-            for h in sizes[:2] if chosen.coarse else sizes:
+            for h in sizes[:2] if report.coarse else sizes:
                 p, w = measured(h, degree) if order == 1 else measured(h, degree, order=order)
                 values = np.array([p @ w / w.sum(), p.min(), p.max()])
                 found[name, kind, h, degree, order] = values
                 off = round(100 * float(w[np.abs(p - 1) > 0.1].sum() / w.sum()), 2)
                 shown = values.round(4).tolist()
                 append(columns, name, kind, h, degree, order, p.size, *shown, off)
-    Report(chosen.out).table("curved-foundations-table", CAPTION, columns, NOTE)
+    report.table("curved-foundations-table", CAPTION, columns, NOTE)
     return found
 
 

@@ -23,7 +23,7 @@ from contact import build_problem, load_case
 from contact.mesh.domain import Domain
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options, solved
+from scripts.reporting import Report, append, empty, solved
 from scripts.studies.two_bodies import ALUMINIUM, RADIUS, STEEL, half_width, middle
 
 #: Force of the whole cylinder (N/mm), and Young's moduli (N/mm^2); Poisson's ratio is 0.3.
@@ -41,10 +41,10 @@ STEPS = 8
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
-    given = options(__doc__, "cylinder_block", arguments)
-    report, size = Report(given.out), 1.2 if given.coarse else 0.6
+    report = Report.of(__doc__, "cylinder_block", arguments)
+    size = 1.2 if report.coarse else 0.6
     depth(report, size, rotations(report, size))
-    friction(report, 100 if given.coarse else 400)
+    friction(report, 100 if report.coarse else 400)
 
 
 def rotations(report: Report, size: float) -> float:

@@ -31,7 +31,7 @@ from contact.results.solution import Solution
 from contact.typing import Array
 from forms.elasticity import hexagonal
 from forms.piezo import hexagonal_voigt
-from scripts.reporting import Report, append, empty, options, solved
+from scripts.reporting import Report, append, empty, solved
 from scripts.studies.half_space import HalfSpace
 from scripts.studies.indentation import Setting
 
@@ -420,9 +420,9 @@ def exponents(report: Report, fineness: float) -> None:
     )
 
 
-def cost(report: Report, coarse: bool) -> None:
+def cost(report: Report) -> None:
     """Tabulate factorisations, back-substitutions and time beside those of the solution."""
-    n = 8 if coarse else 125
+    n = 8 if report.coarse else 125
     pressed = {
         "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [4 * n - 1, n // 4]},
         "material": {"young": 1.0, "poisson": 0.3},
@@ -434,14 +434,16 @@ def cost(report: Report, coarse: bool) -> None:
         "mesh": {
             "generator": "box",
             "size": [2.0, 1.0, 1.0],
-            "cells": [4, 2, 2] if coarse else [24, 12, 12],
+            "cells": [4, 2, 2] if report.coarse else [24, 12, 12],
         },
         "material": {"young": 1.0, "poisson": 0.3},
         "fixed": [{"on": "top", "displacement": [0.002, 0.0, -0.01]}],
         "contact": {"on": "bottom", "gap": "0.01*((x - 1)**2 + (y - 0.5)**2)"},
         "friction": {"law": "coulomb", "mu": 0.3},
     }
-    loop = evolving(pressed | {"mesh": pressed["mesh"] | {"cells": [64, 16]}}, 1 if coarse else 4)
+    loop = evolving(
+        pressed | {"mesh": pressed["mesh"] | {"cells": [64, 16]}}, 1 if report.coarse else 4
+    )
     plastic = loop | {"material": {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 0.01}}
     columns = empty("problem", "unknowns", "parameters", "by", "factorisations", "solves", "s")
     many = ["friction.mu", "material.young", "material.poisson", "fixed.0.displacement.1"]
@@ -486,10 +488,9 @@ def cost(report: Report, coarse: bool) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
-    given = options(__doc__, "derivatives", arguments)
-    report = Report(given.out)
-    exponents(report, 4.0 if given.coarse else 12.0)
-    cost(report, given.coarse)
+    report = Report.of(__doc__, "derivatives", arguments)
+    exponents(report, 4.0 if report.coarse else 12.0)
+    cost(report)
 
 
 if __name__ == "__main__":

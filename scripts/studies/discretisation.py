@@ -18,7 +18,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.error_estimate import estimated
 from contact.results.remarks import LOCKED
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 from tests.problems.bar import changed
 from tests.problems.membrane import cook
 
@@ -47,7 +47,7 @@ def bar(n: int, degree: int, element: str = "standard", **changes: Any) -> Conta
     return build_problem(parse_case(changed(mesh__cells=[4 * n, n], **more)))
 
 
-def locking(report: Report, coarse: bool) -> None:
+def locking(report: Report) -> None:
     """Make the table of elements that lock, and of those that do not. Collective."""
     columns = empty(
         "bar", "element", "cells a unit", "largest displacement", "seconds", "k/g", "estimate",
@@ -55,7 +55,7 @@ def locking(report: Report, coarse: bool) -> None:
     )  # fmt: skip
     for name, changes in LOCKING.items():
         for label, (degree, element) in ELEMENTS.items():
-            for n in (8,) if coarse else (8, 16, 32):
+            for n in (8,) if report.coarse else (8, 16, 32):
                 problem = bar(n, degree, element, **changes)
                 begin = time.perf_counter()
                 solution = solve(problem)
@@ -82,11 +82,11 @@ SHAPED = {label: (*given, "triangle") for label, given in ELEMENTS.items()} | {
 }
 
 
-def membrane(report: Report, coarse: bool) -> None:
+def membrane(report: Report) -> None:
     """Make the table of Cook's membrane. Collective."""
     columns = empty("element", "cells", "rise", "limit", "ratio")
     for label, given in SHAPED.items():
-        for n in (8,) if coarse else (8, 16, 32):
+        for n in (8,) if report.coarse else (8, 16, 32):
             rise = cook(n, *given)
             append(columns, label, n, rise, COOK, rise / COOK)
     report.table(
@@ -98,7 +98,7 @@ def membrane(report: Report, coarse: bool) -> None:
     )
 
 
-def quantities(report: Report, coarse: bool) -> None:
+def quantities(report: Report) -> None:
     """Make the table of intervals beside values on a finer mesh. Collective."""
     columns = empty("problem", "element", "unknowns", "quantity", "low", "high", "value", "inside")
     cases: dict[str, dict[str, Any]] = {
@@ -107,7 +107,7 @@ def quantities(report: Report, coarse: bool) -> None:
         "yielding bar": {"friction__mu": 0.6, "material__yield_strain": 0.005},
         "bar, nu = 0.4999": LOCKING["nu = 0.4999, mu = 0"],
     }
-    most = {1: 1000 if coarse else 10_000, 2: 3000 if coarse else 10_000}
+    most = {1: 1000 if report.coarse else 10_000, 2: 3000 if report.coarse else 10_000}
     for name, changes in cases.items():
         known = solve(_uniform(2, 10 * most[2], **changes)).adaptation[-1]
         for degree, unknowns in most.items():
@@ -133,7 +133,7 @@ def _uniform(degree: int, unknowns: int, **changes: Any) -> Case:
     return parse_case(tables)
 
 
-def per_second(report: Report, coarse: bool) -> None:
+def per_second(report: Report) -> None:
     """Make the table of errors and times by element. Collective."""
     columns = empty("problem", "element", "unknowns", "seconds", "estimate", "largest displacement")
     tip = {"on": "right", "traction": [0.0, -1e-6]}
@@ -145,10 +145,10 @@ def per_second(report: Report, coarse: bool) -> None:
         space = {"space__degree": degree, "space__element": element}
         keys = [f"space.degree={degree}", f'space.element="{element}"']
         cases: list[tuple[str, Case]] = []
-        for n in (8, 16) if coarse else (8, 16, 32):
+        for n in (8, 16) if report.coarse else (8, 16, 32):
             friction = {**LINEAR, "friction__mu": 0.6, "mesh__cells": [4 * n, n]}
             cases.append(("bar", parse_case(changed(**friction, **space))))
-        for n in (3,) if coarse or degree == 2 else (3, 6):
+        for n in (3,) if report.coarse or degree == 2 else (3, 6):
             cells = {"mesh__cells": [80 * n, n]}
             cases.append(("beam", parse_case(changed(**beam, **space, **cells))))
         cases += [(name, load_case(folder / file, keys)) for name, file in files.items()]
@@ -168,13 +168,13 @@ def per_second(report: Report, coarse: bool) -> None:
     )
 
 
-def adaptive(report: Report, coarse: bool) -> None:
+def adaptive(report: Report) -> None:
     """Make the table of adapted meshes beside uniform ones. Collective."""
     columns = empty(
         "problem", "element", "error", "unknowns, adapted", "unknowns, uniform", "rate, adapted",
         "rate, uniform", "meshes", "unknowns, last", "seconds", "seconds, last alone", "ratio",
     )  # fmt: skip
-    for name, degree, error, case, uniform in _adapted(coarse):
+    for name, degree, error, case, uniform in _adapted(report.coarse):
         rows, seconds, last = _timed(case)
         found = {"adapted": [(row["unknowns"], row["error"]) for row in rows], "uniform": []}
         for problem in uniform:
@@ -258,13 +258,9 @@ def _fall(found: Sequence[tuple[int, float]], asked: float) -> tuple[float, floa
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make all of them. Collective."""
-    chosen = options(__doc__ or "", "discretisation", arguments)
-    report = Report(chosen.out)
-    locking(report, chosen.coarse)
-    membrane(report, chosen.coarse)
-    quantities(report, chosen.coarse)
-    per_second(report, chosen.coarse)
-    adaptive(report, chosen.coarse)
+    report = Report.of(__doc__, "discretisation", arguments)
+    for make in (locking, membrane, quantities, per_second, adaptive):
+        make(report)
 
 
 if __name__ == "__main__":

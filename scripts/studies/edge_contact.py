@@ -24,7 +24,7 @@ from contact.results.error_estimate import estimated
 from contact.typing import Array
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 from scripts.studies.discretisation import state_of
 from scripts.studies.error_norms import errors
 
@@ -163,8 +163,8 @@ def _problem(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table of estimates beside errors. Collective."""
-    chosen = options(__doc__ or "", "discretisation", arguments)
-    meshes = MESHES[:1] if chosen.coarse else MESHES
+    report = Report.of(__doc__, "discretisation", arguments)
+    meshes = MESHES[:1] if report.coarse else MESHES
     shown = *(f"error, {n}" for n in meshes), *(f"effectivity, {n}" for n in meshes)
     columns = empty("problem", "element", *shown)
     for name, one in edged().items():
@@ -181,7 +181,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 relative.append(error / norm)
                 effectivity.append(float(np.sqrt(found.total)) / error)
             append(columns, name, f"P{degree}", *relative, *effectivity)
-    Report(chosen.out).table(
+    report.table(
         "edges", "Estimated error over the error where bodies touch at edges", columns, NOTE
     )
 

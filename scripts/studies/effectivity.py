@@ -23,7 +23,7 @@ from contact.mesh.transfer import carry
 from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated
 from forms.hencky import Linear, Log
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 from scripts.studies.discretisation import LINEAR, LOCKING, bar, state_of
 from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import Singular, exact, manufactured, nearly_isochoric
@@ -164,8 +164,8 @@ def block(n: int, degree: int) -> ContactProblem:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table of estimates beside known errors. Collective."""
-    chosen = options(__doc__ or "", "discretisation", arguments)
-    report, share = Report(chosen.out), 2 if chosen.coarse else 1
+    report = Report.of(__doc__, "discretisation", arguments)
+    share = 2 if report.coarse else 1
     columns = empty(
         "problem", "known by", "element", "cells", "error", "estimate", "effectivity", "why not",
     )  # fmt: skip

@@ -77,14 +77,14 @@ def _settings(iteration: Iteration) -> Options:
     return FixedPointOptions(tolerance=tight, inner_tolerance=1e-12, material_step="secant")
 
 
-def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
+def fixed_points(report: Report) -> dict[str, float]:
     """Show the errors of the fixed points per iteration; return observed rates. Collective."""
-    n = 8 if coarse else 16
+    n = 8 if report.coarse else 16
     figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.4), sharey=True)
     rows = []
     data: dict[str, Sequence[float]] = {}
     rates = {}
-    chosen = ITERATIONS[1::3] if coarse else ITERATIONS
+    chosen = ITERATIONS[1::3] if report.coarse else ITERATIONS
     for iteration in chosen:
         distances, strain, residual = watched(iteration, n)
         # Not the first steps, nor the last, where the error is that of the final iterate.

@@ -22,7 +22,7 @@ from contact import J2, Body, Contact, Fixed, Load, Problem, Solution, solve_ste
 from contact.mesh.domain import from_mesh, revolved
 from contact.results.fields import DerivedFields
 from contact.typing import Array
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 
 INNER, OUTER, POISSON = 1.0, 2.0, 0.3
 
@@ -288,11 +288,11 @@ def limits(report: Report, sizes: Sequence[int]) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
-    given = options(__doc__ or "", "plasticity", arguments)
-    report, coarse = Report(given.out), given.coarse
-    unloading(report, 4 if coarse else 32)
-    shakedown(report, 4 if coarse else 32)
-    limits(report, (4,) if coarse else (8, 16, 32))
+    report = Report.of(__doc__, "plasticity", arguments)
+    cells = 4 if report.coarse else 32
+    unloading(report, cells)
+    shakedown(report, cells)
+    limits(report, (4,) if report.coarse else (8, 16, 32))
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from contact.typing import Array
 from forms.elasticity import isotropic
 from forms.piezo import hexagonal_voigt
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options, solved
+from scripts.reporting import Report, append, empty, solved
 from scripts.studies import half_space
 from scripts.studies.half_space import HalfSpace, Indentation
 
@@ -280,12 +280,11 @@ def units_and_poling(report: Report, fineness: float) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
-    chosen = options(__doc__, "indentation", arguments)
-    fineness = 6.0 if chosen.coarse else 12.0
-    report = Report(chosen.out)
+    report = Report.of(__doc__, "indentation", arguments)
+    fineness = 6.0 if report.coarse else 12.0
     half_spaces(report)
     units_and_poling(report, fineness)
-    table(report, fineness, MATERIALS[:1] if chosen.coarse else MATERIALS)
+    table(report, fineness, MATERIALS[:1] if report.coarse else MATERIALS)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from contact import build_problem, evolve
 from contact.results.contact_nodes import contact_table
 from contact.results.resultants import charge_balance
 from contact.typing import Array
-from scripts.reporting import Report, options, solved, subplots
+from scripts.reporting import Report, solved, subplots
 from scripts.studies.indentation import (
     CURVATURE,
     HALF_ANGLE,
@@ -153,11 +153,11 @@ def currents(report: Report, fineness: float, steps: int) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Draw the figures."""
-    chosen = options(__doc__, "indentation", arguments)
-    report, fineness = Report(chosen.out), 6.0 if chosen.coarse else 12.0
+    report = Report.of(__doc__, "indentation", arguments)
+    fineness = 6.0 if report.coarse else 12.0
     pressures(report, fineness)
     # A current is a difference of charges: the contact's edge wanders from node to node.
-    currents(report, 3 * fineness, 10 if chosen.coarse else 30)
+    currents(report, 3 * fineness, 10 if report.coarse else 30)
 
 
 if __name__ == "__main__":

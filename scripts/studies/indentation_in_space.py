@@ -15,7 +15,7 @@ from contact import Case, Solution, load_case, parse_case
 from contact.results.resultants import charge_balance, movements
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, observed_orders, options, solved
+from scripts.reporting import Report, append, empty, observed_orders, solved
 from scripts.studies.indentation import COUPLING, THESIS
 
 #: How far the cut of the ball is lowered; potential of the conducting plate (GV).
@@ -80,12 +80,12 @@ def measured(space: bool, n: float, conducting: bool, degree: int = 1) -> Array:
     return np.array([force, min(near)[1]])
 
 
-def beside_revolution(report: Report, coarse: bool) -> None:
+def beside_revolution(report: Report) -> None:
     """Tabulate the errors of half plane and space against a fine half plane. Collective."""
-    exact = {kind: measured(False, 8 if coarse else 32, kind, 2) for kind in (False, True)}
+    exact = {kind: measured(False, 8 if report.coarse else 32, kind, 2) for kind in (False, True)}
     columns = empty("mesh", "n", "P, insulating", "phi", "P, conducting", "Q")
     for space in (False, True):
-        sizes = (2, 3) if coarse else (4, 8, 12) if space else (4, 8, 16)
+        sizes = (2, 3) if report.coarse else (4, 8, 12) if space else (4, 8, 16)
         errors = [
             np.concatenate([np.abs(measured(space, n, k) / exact[k] - 1) for k in (False, True)])
             for n in sizes
@@ -116,13 +116,13 @@ def rotation(solution: Solution) -> float:
     return float(np.deg2rad(turned[1]) * 4 / 3 / (1 - POISSON**2) / (2 * MOMENT))
 
 
-def tilted_punch(report: Report, coarse: bool) -> None:
+def tilted_punch(report: Report) -> None:
     """Tabulate rotations, and the costs of a solve, condensed and not. Collective."""
     columns = empty(
         "n", "extent", "unknowns", "theta", "order", "solves", "seconds", "solves, lu",
         "seconds, lu",
     )  # fmt: skip
-    sizes = (0.25, 0.5) if coarse else (0.5, 1.0, 2.0, 2.5)
+    sizes = (0.25, 0.5) if report.coarse else (0.5, 1.0, 2.0, 2.5)
     rows = []
     for n, extent in [*((n, 10.0) for n in sizes), (sizes[1], 20.0)]:
         more = [f"mesh.extent={extent}", f"mesh.size={extent / 3}"]
@@ -147,10 +147,9 @@ def tilted_punch(report: Report, coarse: bool) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
-    chosen = options(__doc__, "indentation", arguments)
-    report = Report(chosen.out)
-    beside_revolution(report, chosen.coarse)
-    tilted_punch(report, chosen.coarse)
+    report = Report.of(__doc__, "indentation", arguments)
+    beside_revolution(report)
+    tilted_punch(report)
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ from contact.mesh.reader import from_generator
 from contact.mesh.transfer import refined
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 from scripts.studies.error_norms import DualNorm
 
 CAPTION = "Inf-sup constant of the nodal multipliers"
@@ -160,17 +160,17 @@ def constant(kind: Mesh, domain: Domain, degree: int, levels: int) -> tuple[floa
 
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int, int], float]:
     """Make the table; return the constants by mesh, degree and cells."""
-    chosen = options(__doc__, "inf_sup", arguments)
+    report = Report.of(__doc__, "inf_sup", arguments)
     columns = empty("mesh", "degree", "cells", "multipliers", "refined", "beta")
     found = {}
     for name, (kind, degrees) in SERIES.items():
         for degree, (cells, levels) in degrees.items():
-            for n in cells[:2] if chosen.coarse else cells:
+            for n in cells[:2] if report.coarse else cells:
                 beta, count = constant(kind, kind.make(n), degree, levels)
                 found[name, degree, n] = beta
                 append(columns, name, degree, n, count, levels, round(beta, 4))
                 print(name, degree, n, count, levels, f"{beta:.4f}", flush=True)
-    Report(chosen.out).table("inf-sup-table", CAPTION, columns, NOTE)
+    report.table("inf-sup-table", CAPTION, columns, NOTE)
     return found
 
 

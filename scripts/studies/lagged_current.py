@@ -89,10 +89,10 @@ def threshold(name: str, cells: tuple[int, int], width: float) -> tuple[float, f
     return low, high
 
 
-def theorem_5_2(report: Report, coarse: bool) -> dict[str, float]:
+def theorem_5_2(report: Report) -> dict[str, float]:
     """Show the errors of Algorithm 4 per iteration, lagged and implicit. Collective."""
-    cells = (16, 8) if coarse else (64, 32)
-    name, shown = "piezo-8-1-conductive", SHOWN[1::2] if coarse else SHOWN
+    cells = (16, 8) if report.coarse else (64, 32)
+    name, shown = "piezo-8-1-conductive", SHOWN[1::2] if report.coarse else SHOWN
     figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.2), sharey=True)
     data: dict[str, Sequence[float]] = {}
     columns = empty("k_e", "charge", "iterations", "converged", "observed rate")
@@ -109,7 +109,7 @@ def theorem_5_2(report: Report, coarse: bool) -> dict[str, float]:
         ax.set(title=f"charge {how}", xlabel="iteration n")
         ax.legend()
     axes[0].set_ylabel(r"$\|x_n - x\|_X$")
-    grid, width = ((8, 4), 0.1) if coarse else ((32, 16), 0.03)
+    grid, width = ((8, 4), 0.1) if report.coarse else ((32, 16), 0.03)
     low, high = threshold(name, grid, width)
     rates["threshold"] = low
     ends = errors(name, grid, 2.0, True, 60, changes=HYPOTHESES)[0][-2:]

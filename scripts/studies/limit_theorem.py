@@ -26,7 +26,6 @@ from scripts.reporting import (
     Report,
     iterates,
     observed_orders,
-    options,
     solved,
     subplots,
 )
@@ -201,10 +200,10 @@ def draw_iterations(curves: Mapping[str, Array]) -> Figure:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Compute, print and draw all. Collective."""
-    chosen = options(__doc__, "limit_theorem", arguments)
-    report, cells = Report(chosen.out), (24, 4) if chosen.coarse else (96, 16)
+    report = Report.of(__doc__, "limit_theorem", arguments)
+    cells = (24, 4) if report.coarse else (96, 16)
     # From the end, which the orders are of.
-    some = slice(None, None, -4 if chosen.coarse else -1)
+    some = slice(None, None, -4 if report.coarse else -1)
     values, stiffness, thickness = (every[some][::-1] for every in (VALUES, STIFFNESS, THICKNESS))
     limits = {
         "layer of thickness 0.1": theorem_6_3(True, cells, values),

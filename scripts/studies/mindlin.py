@@ -23,7 +23,7 @@ from contact import parse_case
 from contact.typing import Array
 from meshes.grading import Sizes, finish
 from meshes.turning import turn as turned
-from scripts.reporting import ONE_COLUMN, Report, append, empty, options, solved, subplots
+from scripts.reporting import ONE_COLUMN, Report, append, empty, solved, subplots
 
 #: Radius (mm) and Young's modulus (N/mm^2) of the balls, and the friction coefficient.
 RADIUS, YOUNG, MU = 50.0, 20e3, 0.3
@@ -44,11 +44,10 @@ RING, GROWTH, LARGEST = (0.8, 0.3), 0.5, 15.0
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table and the figure."""
-    given = options(__doc__, "mindlin", arguments)
-    report = Report(given.out)
+    report = Report.of(__doc__, "mindlin", arguments)
     fine = [(0.0, PRESS, 6, 8), (0.0, PRESS, 12, 8), (0.0, PRESS, 12, 12), (0.0, PRESS, 18, 12)]
     fine += [(0.0, 4 * PRESS, 12, 12), (0.0, PRESS / 4, 12, 12), (0.3, PRESS, 12, 12)]
-    runs = [(0.0, PRESS, 4, 6)] if given.coarse else fine
+    runs = [(0.0, PRESS, 4, 6)] if report.coarse else fine
     rows = empty("nu", "a/R", "a/h", "sectors", "Q/(mu P)", "area", "dissipation")
     for k, (poisson, press, elements, sectors) in enumerate(runs):
         loop = turn(poisson, elements, sectors, press)
@@ -68,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     draw(report, shown)
     plane = empty("degree", "a/h", "dissipation")
     for degree in (1, 2):
-        for elements in (6,) if given.coarse else (6, 12, 24, 48, 96)[: 7 - 2 * degree]:
+        for elements in (6,) if report.coarse else (6, 12, 24, 48, 96)[: 7 - 2 * degree]:
             append(plane, degree, elements, turn_of_cylinders(elements, 3, degree))
     report.table(
         "mindlin-plane",

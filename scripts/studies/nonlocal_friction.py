@@ -13,7 +13,7 @@ from mpi4py import MPI
 from contact import Solution
 from contact.results.contact_nodes import Table, contact_table
 from scripts.cases import bar
-from scripts.reporting import TWO_COLUMNS, Report, append, empty, options, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, empty, solved, subplots
 from scripts.studies.error_norms import errors
 
 RHO = 1e4
@@ -111,9 +111,9 @@ def _draw(report: Report, name: str, where: str, tables: dict[str, Table | None]
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables and figures."""
-    chosen = options(__doc__, "nonlocal_friction", arguments)
+    report = Report.of(__doc__, "nonlocal_friction", arguments)
     for load in LOADS:
-        study(Report(chosen.out), 8 if chosen.coarse else 64, load)
+        study(report, 8 if report.coarse else 64, load)
 
 
 if __name__ == "__main__":

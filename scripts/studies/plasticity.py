@@ -18,7 +18,7 @@ from contact.typing import Array
 from forms.hencky import UserLaw
 from forms.ops import Value, maximum
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options, solved, subplots
+from scripts.reporting import Report, append, empty, solved, subplots
 
 YOUNG, POISSON, YIELD = 200e3, 0.3, 250.0
 STEEL = {"law": "j2", "young": YOUNG, "poisson": POISSON, "yield_stress": YIELD}
@@ -81,12 +81,12 @@ def punch(size: float, element: str) -> Case:
     )
 
 
-def prandtl(report: Report, coarse: bool) -> None:
+def prandtl(report: Report) -> None:
     """Make the table of limit loads of a punch. Collective."""
     limit = (2 + np.pi) / np.sqrt(3)
     columns = empty("element", "size", "unknowns", "steps", "p/Y", "over the limit")
     for element in ELEMENTS:
-        for size in (0.2,) if coarse else (0.2, 0.1, 0.05):
+        for size in (0.2,) if report.coarse else (0.2, 0.1, 0.05):
             solution = solved(punch(size, element))
             force = abs(float(solution.steps[-1].row["contact_force_y"])) / YIELD
             unknowns = solution.problem.body.layout.unknowns
@@ -196,12 +196,12 @@ def first_yield(shape: str, fineness: float, poisson: float = POISSON) -> tuple[
     raise ValueError(f"{shape}: nothing has yielded")
 
 
-def ball_and_cylinder(report: Report, coarse: bool) -> None:
+def ball_and_cylinder(report: Report) -> None:
     """Make the table of first yield under Hertzian contact."""
     columns = empty("body", "nu", "elements", "p_0/Y", "closed form", "depth/a", "closed form ")
     for shape, poisson in YIELDING:
         known = hertz_first_yield(shape, poisson)
-        sizes = (6,) if coarse else (6, 12, 24) if poisson == POISSON else (24,)
+        sizes = (6,) if report.coarse else (6, 12, 24) if poisson == POISSON else (24,)
         for fineness in sizes:
             pressure, depth = first_yield(shape, fineness, poisson)
             append(columns, shape, poisson, fineness, pressure, known[0], depth, known[1])
@@ -239,7 +239,7 @@ def ball_cases(coarse: bool) -> list[Case]:
     ]
 
 
-def pressed_ball(report: Report, coarse: bool) -> None:
+def pressed_ball(report: Report) -> None:
     """Make the tables of a ball that is pressed into steel that yields, and lifted. Collective."""
     depth = depth_of_first_yield()
     first = 4 / 3 * EFFECTIVE * np.sqrt(RADIUS) * depth**1.5
@@ -249,7 +249,7 @@ def pressed_ball(report: Report, coarse: bool) -> None:
     )  # fmt: skip
     lifted = empty("w/w_c", "mark over w", "Etsion et al.", "exponent", "rise 4 E* a/(3 P)")
     deepest = 0.0
-    for case in ball_cases(coarse):
+    for case in ball_cases(report.coarse):
         solution = solved(case)
         rows = [step.row for step in solution.steps]
         moved = np.array([-float(row["rigid_y"]) for row in rows]) / depth
@@ -362,14 +362,14 @@ HARDENINGS: dict[str, dict[str, Any]] = {
 }
 
 
-def cost(report: Report, coarse: bool) -> None:
+def cost(report: Report) -> None:
     """Tabulate the processor time of an iteration with J2 and with Hencky's law. Collective."""
-    times, repeated = np.linspace(0.0, 3.0, 19)[1:].tolist(), 1 if coarse else 3
+    times, repeated = np.linspace(0.0, 3.0, 19)[1:].tolist(), 1 if report.coarse else 3
     columns = empty(
         "degree", "cells", "factorisations", "material", "iterations", "s an iteration",
         "ratio to Hencky's",
     )  # fmt: skip
-    for degree, cells in ((2, 8),) if coarse else ((2, 24), (1, 64)):
+    for degree, cells in ((2, 8),) if report.coarse else ((2, 24), (1, 64)):
         mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [2 * cells, cells]}
         for words, reuse in (("few (chord steps)", "within"), ("each iteration", "never")):
             settings, hencky_takes = NewtonOptions(reuse=reuse), np.nan
@@ -439,14 +439,13 @@ def _courses(solution: Solution) -> tuple[Array, Array, Array]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make all of them. Collective."""
-    chosen = options(__doc__ or "", "plasticity", arguments)
-    report = Report(chosen.out)
+    report = Report.of(__doc__, "plasticity", arguments)
     newton(report)
-    cost(report, chosen.coarse)
+    cost(report)
     apart(report)
-    prandtl(report, chosen.coarse)
-    ball_and_cylinder(report, chosen.coarse)
-    pressed_ball(report, chosen.coarse)
+    prandtl(report)
+    ball_and_cylinder(report)
+    pressed_ball(report)
 
 
 if __name__ == "__main__":

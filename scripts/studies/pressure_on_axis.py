@@ -23,7 +23,7 @@ from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 
 POISSON, RADIUS, DEPTH, SIZE = 0.3, 4.0, 9e-4, 0.5
 #: How a square is cut, and where it is not.
@@ -80,8 +80,8 @@ def profile(n: int, degree: int, way: str) -> Profile:
 
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[int, str, int], Profile]:
     """Make the table; return the profiles. Collective."""
-    chosen = options(__doc__, "pressure_on_axis", arguments)
-    meshes = (100, 200) if chosen.coarse else (100, 200, 400)
+    report = Report.of(__doc__, "pressure_on_axis", arguments)
+    meshes = (100, 200) if report.coarse else (100, 200, 400)
     kinds = [(1, way) for way in WAYS] + [(2, way) for way in WAYS if way != "left_right"]
     found = {(*kind, n): profile(n, *kind) for kind in kinds for n in meshes}
     best = found[2, "crossed", meshes[-1]]
@@ -93,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[int, str, int], P
         values = (at_axis, *error[:3], middle)
         rounded = (round(float(e), 3) + 0.0 for e in values)
         append(columns, degree, way, n, one.square**0.5, *rounded)
-    Report(chosen.out).table("pressure-on-axis-table", CAPTION, columns, NOTE)
+    report.table("pressure-on-axis-table", CAPTION, columns, NOTE)
     return found
 
 

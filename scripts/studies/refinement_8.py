@@ -15,7 +15,7 @@ from contact import Solution, solve
 from contact.results.resultants import charge_balance
 from contact.typing import Array
 from scripts.cases import on_grid
-from scripts.reporting import Report, options
+from scripts.reporting import Report
 
 #: A mesh that is as symmetric as the problem.
 CROSSED = ("mesh.diagonal=crossed",)
@@ -138,10 +138,9 @@ def refined(report: Report, example: str, levels: Sequence[int]) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables. Collective."""
-    chosen = options(__doc__, "refinement_8", arguments)
-    report = Report(chosen.out)
+    report = Report.of(__doc__, "refinement_8", arguments)
     for example in EXAMPLES:
-        refined(report, example, (12, 24) if chosen.coarse else (48, 96, 192, 384))
+        refined(report, example, (12, 24) if report.coarse else (48, 96, 192, 384))
 
 
 if __name__ == "__main__":

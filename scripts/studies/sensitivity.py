@@ -12,7 +12,7 @@ import numpy as np
 
 from contact import Solution, build_problem, solve
 from scripts.cases import on_grid
-from scripts.reporting import Report, options
+from scripts.reporting import Report
 
 
 @dataclass(frozen=True)
@@ -83,10 +83,10 @@ def run(sweep: Sweep, value: float, cells: tuple[int, int], domain: object) -> S
     return solve(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
 
 
-def study(report: Report, name: str, coarse: bool) -> None:
+def study(report: Report, name: str) -> None:
     """Tabulate contact force and pressure over one parameter. Collective."""
     sweep = SWEEPS[name]
-    cells = (24, 24 // (sweep.cells[0] // sweep.cells[1])) if coarse else sweep.cells
+    cells = (24, 24 // (sweep.cells[0] // sweep.cells[1])) if report.coarse else sweep.cells
     parameter = name.partition("-")[0]
     rows: list[dict[str, object]] = []
     domain = None
@@ -111,9 +111,9 @@ def study(report: Report, name: str, coarse: bool) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables. Collective."""
-    chosen = options(__doc__, "sensitivity", arguments)
+    report = Report.of(__doc__, "sensitivity", arguments)
     for name in SWEEPS:
-        study(Report(chosen.out), name, chosen.coarse)
+        study(report, name)
 
 
 if __name__ == "__main__":

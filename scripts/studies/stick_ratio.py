@@ -24,7 +24,7 @@ from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 from scripts.studies import stick_limit
 
 POISSON, HALF_WIDTH = 0.3, 0.02
@@ -139,15 +139,15 @@ def _between(x: np.ndarray, beyond: np.ndarray) -> float:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
-    given = options(__doc__, "stick_ratio", arguments)
-    cells, steps = (20, STEPS[:3]) if given.coarse else (160, STEPS)
+    report = Report.of(__doc__, "stick_ratio", arguments)
+    cells, steps = (20, STEPS[:3]) if report.coarse else (160, STEPS)
     for name, pressed in PRESSED.items():
         labels = [f"{count} step{'s' * (count > 1)}" for count in steps]
         columns = empty("mu", *labels, "boundary elements", "uncoupled")
         for mu in COEFFICIENTS:
             row = [*pressed.ratios(mu, steps, cells), pressed.coupled(mu), pressed.uncoupled(mu)]
             append(columns, mu, *(f"{value:.3f}" for value in row))
-        Report(given.out).table(
+        report.table(
             f"stick-ratio-{name}",
             f"Stick ratio c/a of {CAPTIONS[name]}",
             columns,

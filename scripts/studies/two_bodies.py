@@ -14,7 +14,7 @@ from contact import load_case, parse_case
 from contact.results.contact_nodes import Table, contact_table
 from contact.results.solution import Solution
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options, solved
+from scripts.reporting import Report, append, empty, solved
 from scripts.studies.curved_foundations import ratios, two_rings
 
 #: E/(1 - nu^2) of steel and aluminium of the cylinder on a block, radius there.
@@ -29,12 +29,11 @@ BALL, YOUNG = 50.0, 20e3
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
-    given = options(__doc__, "two_bodies", arguments)
-    report = Report(given.out)
-    coarse = (1.2, 0.6) if given.coarse else (1.2, 0.6, 0.3, 0.15)
+    report = Report.of(__doc__, "two_bodies", arguments)
+    coarse = (1.2, 0.6) if report.coarse else (1.2, 0.6, 0.3, 0.15)
     hertz(report, coarse)
-    round_bodies(report, (5, 10) if given.coarse else (5, 10, 20))
-    rings(report, (0.1, 0.05) if given.coarse else (0.1, 0.05, 0.025))
+    round_bodies(report, (5, 10) if report.coarse else (5, 10, 20))
+    rings(report, (0.1, 0.05) if report.coarse else (0.1, 0.05, 0.025))
 
 
 def table_of(solution: Solution) -> Table:

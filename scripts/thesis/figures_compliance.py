@@ -25,7 +25,6 @@ from scripts.reporting import (
     ONE_COLUMN,
     TWO_COLUMNS,
     Report,
-    options,
     run_of,
     solved,
     subplots,
@@ -236,8 +235,8 @@ def series(report: Report, cells: tuple[int, int], values: Mapping[float, str] =
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the figures. Collective."""
-    chosen = options(__doc__, "figures_compliance", arguments)
-    report, cells = Report(chosen.out), (24, 4) if chosen.coarse else (96, 16)
+    report = Report.of(__doc__, "figures_compliance", arguments)
+    cells = (24, 4) if report.coarse else (96, 16)
     if MPI.COMM_WORLD.rank == 0:
         laws(report)
     data = "Example 8.4, mu = 0.6, k_e = 1"
@@ -266,9 +265,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         ("8-9", "8-3-layer", f"Example 8.3, {layer}", "layer"),
         ("8-10", "8-4-layer", f"Example 8.4, {layer}", "layer"),
     ]
-    for number, name, topic, *more in examples[:: 5 if chosen.coarse else 1]:
+    for number, name, topic, *more in examples[:: 5 if report.coarse else 1]:
         example(report, number, f"compliance-{name}", topic, cells, *more)
-    series(report, cells, dict(list(VALUES.items())[-2:]) if chosen.coarse else VALUES)
+    series(report, cells, dict(list(VALUES.items())[-2:]) if report.coarse else VALUES)
 
 
 if __name__ == "__main__":

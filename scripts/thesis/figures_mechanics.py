@@ -16,7 +16,7 @@ from contact.plot.body import draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.results.contact_nodes import Table, contact_table
 from scripts.cases import bar
-from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, run_of, solved, subplots
 
 RHO = 1e4
 EPS = 1.05e-5
@@ -115,8 +115,8 @@ def compare(report: Report, tables: Mapping[str, Table | None]) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the figures."""
-    chosen = options(__doc__, "figures_mechanics", arguments)
-    report, n = Report(chosen.out), 8 if chosen.coarse else 64
+    report = Report.of(__doc__, "figures_mechanics", arguments)
+    n = 8 if report.coarse else 64
     tables = {
         number: draw(report, number, bar(n, load, RHO, *changes), text, load)
         for number, (load, changes, text) in FIGURES.items()

@@ -22,7 +22,7 @@ from contact.plot.body import picture
 from contact.results.contact_nodes import contact_table
 from contact.typing import Array
 from forms.kinematics import strain
-from scripts.reporting import TWO_COLUMNS, Report, empty, observed_orders, options, run_of, subplots
+from scripts.reporting import TWO_COLUMNS, Report, empty, observed_orders, run_of, subplots
 from scripts.studies.lagged_current import theorem_5_2
 from scripts.thesis.figures_compliance import (
     ALONG,
@@ -136,9 +136,9 @@ def norms(body: BodyEquilibrium) -> Callable[[Array], Array]:
     return measure
 
 
-def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
+def figure_8_7(report: Report) -> dict[str, Array]:
     """Draw the error against a reference three levels finer than the last mesh. Collective."""
-    cells, last = ((4, 8), 64) if coarse else ((8, 16, 32, 64), 512)
+    cells, last = ((4, 8), 64) if report.coarse else ((8, 16, 32, 64), 512)
     columns = empty("problem", "cells", "reference")
     for name in NORMS:
         columns |= {name: [], f"order ({name})": []}
@@ -196,15 +196,15 @@ def error_figure(h: Array, found: Mapping[str, Array]) -> Figure:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the figures. Collective."""
-    chosen = options(__doc__, "figures_piezo", arguments)
-    report, cells = Report(chosen.out), (16, 8) if chosen.coarse else (128, 64)
+    report = Report.of(__doc__, "figures_piezo", arguments)
+    cells = (16, 8) if report.coarse else (128, 64)
     figure_8_2a(report, cells)
     topic = "k_e = 1, phi_F = 32"
     example(report, "8-3", "piezo-8-1-conductive", f"Example 8.1, {topic}", cells)
     example(report, "8-5", "piezo-8-2", f"Example 8.2, {topic}", cells)
     all_potentials(report, cells)
-    theorem_5_2(report, chosen.coarse)
-    figure_8_7(report, chosen.coarse)
+    theorem_5_2(report)
+    figure_8_7(report)
 
 
 if __name__ == "__main__":

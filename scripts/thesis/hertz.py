@@ -17,7 +17,7 @@ from contact.plot.body import draw_plane, picture
 from contact.results.contact_nodes import contact_table
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, run_of, solved, subplots
 
 
 @dataclass(frozen=True)
@@ -350,11 +350,10 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables and the figure."""
-    chosen = options(__doc__, "hertz", arguments)
-    report = Report(chosen.out)
-    figure_7_2(report, cylinders(report, 12 if chosen.coarse else 30))
+    report = Report.of(__doc__, "hertz", arguments)
+    figure_7_2(report, cylinders(report, 12 if report.coarse else 30))
     coarse = ((4, 1), (6, 1))
-    spheres(report, coarse if chosen.coarse else ((4, 1), (8, 1), (12, 1), (4, 2), (6, 2)))
+    spheres(report, coarse if report.coarse else ((4, 1), (8, 1), (12, 1), (4, 2), (6, 2)))
 
 
 if __name__ == "__main__":

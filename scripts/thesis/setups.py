@@ -12,7 +12,7 @@ from mpi4py import MPI
 from contact import build_problem, load_case
 from contact.cli.setup import draw_setup
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 
 #: Figure -> case file, changes of its mesh for a drawing, title.
 FIGURES: Mapping[str, tuple[str, tuple[str, ...], str]] = {
@@ -62,7 +62,7 @@ def constants(report: Report) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Draw the set-ups and print the constants. Collective."""
-    report = Report(options(__doc__, "setups", arguments).out)
+    report = Report.of(__doc__, "setups", arguments)
     for number, (name, changes, topic) in FIGURES.items():
         case = load_case(CASES / f"{name}.toml", changes)
         problem = build_problem(case)

@@ -13,7 +13,7 @@ from contact import build_problem
 from contact.body.equilibrium import BodyEquilibrium
 from contact.problem.state import State
 from scripts.cases import on_grid
-from scripts.reporting import Report, append, empty, iterates, options
+from scripts.reporting import Report, append, empty, iterates
 from scripts.thesis.tables_compliance import EPS_FP, LAGGED
 
 #: The thesis's count.
@@ -51,8 +51,8 @@ def count(body: BodyEquilibrium, states: Sequence[State], phi_scale: float) -> f
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table. Collective."""
-    chosen = options(__doc__, "stopping_8_3", arguments)
-    cells = (24, 4) if chosen.coarse else (96, 16)
+    report = Report.of(__doc__, "stopping_8_3", arguments)
+    cells = (24, 4) if report.coarse else (96, 16)
     columns = empty(
         "case", "inner loop", "thesis", "(6.40), u and phi as they are", "(6.40), phi scaled",
         "inner, first", "inner, last", "residual",
@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             append(
                 columns, topic, rule, THESIS, *counts, solves[0], last, outcome.residuals.largest
             )
-    Report(chosen.out).table(
+    report.table(
         "stopping-8-3",
         f"Example 8.3: iterations of Algorithm 8 until (6.40) with eps_fp = 1e-5, {cells[0]} x "
         f"{cells[1]} cells",

@@ -13,7 +13,7 @@ from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.results.solution import Solution
 from scripts.cases import bar
-from scripts.reporting import Report, empty, observed_orders, options, solved
+from scripts.reporting import Report, empty, observed_orders, solved
 from scripts.studies.error_norms import DualNorm, errors
 
 LOADS = (-0.005, -0.05)
@@ -190,9 +190,8 @@ def _with(n: int, changes: Sequence[str] | None, *method: str) -> Case:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table and the study."""
-    chosen = options(__doc__, "table_7_2", arguments)
-    n = 8 if chosen.coarse else 32
-    report = Report(chosen.out)
+    report = Report.of(__doc__, "table_7_2", arguments)
+    n = 8 if report.coarse else 32
     table(report, n)
     study(report, min(n, 16))
 

@@ -12,7 +12,7 @@ import numpy as np
 from contact import Case, Solution, build_problem, solve
 from contact.mesh.domain import Domain
 from scripts.cases import on_grid
-from scripts.reporting import Report, options
+from scripts.reporting import Report
 
 #: mu = k_e -> iterations of the thesis.
 THESIS: Mapping[float, int] = {
@@ -187,9 +187,9 @@ def ended(solution: Solution) -> dict[str, object]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make all tables. Collective."""
-    chosen = options(__doc__, "tables_compliance", arguments)
-    report, cells = Report(chosen.out), (24, 4) if chosen.coarse else (96, 16)
-    rows = dict(list(THESIS.items())[2::4] if chosen.coarse else THESIS)
+    report = Report.of(__doc__, "tables_compliance", arguments)
+    cells = (24, 4) if report.coarse else (96, 16)
+    rows = dict(list(THESIS.items())[2::4] if report.coarse else THESIS)
     examples(report, cells)
     for suffix in ("", "-layer"):
         table_8_4(report, cells, suffix, rows)

@@ -13,7 +13,7 @@ from contact import Solution, build_problem
 from contact.results.resultants import charge_balance
 from scripts.cases import on_grid
 from scripts.force_balance import force_balance
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 from scripts.thesis.tables_compliance import difference, ended, iterations, run
 from tests.problems.piezo import first_solve
 
@@ -176,10 +176,10 @@ def values(solution: Solution) -> dict[str, object]:
     }
 
 
-def iterative(report: Report, coarse: bool) -> None:
+def iterative(report: Report) -> None:
     """Tabulate the iterations of the linear solver over the mesh. Collective."""
-    plane = [(16, 8), (32, 16)] if coarse else [(n, n // 2) for n in (32, 64, 128, 256)]
-    space = [(4, 4, 8), (6, 6, 12)] if coarse else [(n, n, 2 * n) for n in (10, 14, 20, 24)]
+    plane = [(16, 8), (32, 16)] if report.coarse else [(n, n // 2) for n in (32, 64, 128, 256)]
+    space = [(4, 4, 8), (6, 6, 12)] if report.coarse else [(n, n, 2 * n) for n in (10, 14, 20, 24)]
     columns = empty("body", "cells", "unknowns", "iterations")
     for name, meshes in (("piezo-8-1-conductive", plane), ("piezo-column", space)):
         for cells in meshes:
@@ -197,13 +197,13 @@ def iterative(report: Report, coarse: bool) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make all tables. Collective."""
-    chosen = options(__doc__, "tables_piezo", arguments)
-    report, cells = Report(chosen.out), (16, 8) if chosen.coarse else (64, 32)
+    report = Report.of(__doc__, "tables_piezo", arguments)
+    cells = (16, 8) if report.coarse else (64, 32)
     for number in THESIS:
         table_8(report, number, cells)
         series(report, number, cells)
     other_rho(report, cells)
-    iterative(report, chosen.coarse)
+    iterative(report)
 
 
 if __name__ == "__main__":

@@ -78,7 +78,7 @@ def test_the_dual_norm_of_a_pressure_is_the_energy_that_it_makes():
 
 
 def test_sensitivity(tmp_path):
-    sensitivity.study(Report(tmp_path), "radius", coarse=True)
+    sensitivity.study(Report(tmp_path, coarse=True), "radius")
     found = rows_of(tmp_path / "sensitivity-radius-table.csv")
     assert {row["converged"] for row in found} == {"True"}
 
@@ -125,7 +125,7 @@ def test_corner_exponents(tmp_path):
 @pytest.mark.slow
 def test_theorem_5_2(tmp_path):
     """The rate of the lagged charge grows with k_e up to a limit, that of the implicit does not."""
-    rates = lagged_current.theorem_5_2(Report(tmp_path), coarse=True)
+    rates = lagged_current.theorem_5_2(Report(tmp_path, coarse=True))
     assert 1.1 < rates["threshold"] < 1.3
     assert rates["lagged, 2"] > 0.9
     assert rates["lagged, 0.5"] < 0.6
@@ -134,11 +134,11 @@ def test_theorem_5_2(tmp_path):
 
 
 def test_tables(tmp_path):
-    report = Report(tmp_path)
+    report = Report(tmp_path, coarse=True)
     tables_piezo.series(report, "8.3", (16, 8))
     for line in rows_of(tmp_path / "series-k-e-8-2.csv"):
         assert line["converged"] == "True" and float(line["charge imbalance"]) < 1e-8
-    tables_piezo.iterative(report, coarse=True)
+    tables_piezo.iterative(report)
     assert len(rows_of(tmp_path / "piezo-linear-iterations.csv")) == 4
 
 

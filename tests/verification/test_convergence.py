@@ -89,7 +89,7 @@ def test_a_grid_is_pulled_towards_lines():
 
 
 def test_graded_meshes_give_back_what_the_corners_take(tmp_path):
-    found = study.graded_meshes(Report(tmp_path), coarse=True)
+    found = study.graded_meshes(Report(tmp_path, coarse=True))
     uniform, graded = (found[f"P1, power {q:g}"] for q in (1.0, 1.5))
     assert np.all(graded < 0.93 * uniform)
     orders = [np.log2(table[0] / table[1])[1] for table in (uniform, graded)]
@@ -98,7 +98,7 @@ def test_graded_meshes_give_back_what_the_corners_take(tmp_path):
 
 @pytest.mark.slow
 def test_figure_7_6(tmp_path):
-    found = study.figure_7_6(Report(tmp_path), coarse=True)
+    found = study.figure_7_6(Report(tmp_path, coarse=True))
     for label, table in found.items():
         orders = np.log2(table[:-1] / table[1:])
         assert np.all(orders[:, 0] > 1.3), label
@@ -109,7 +109,7 @@ def test_figure_7_6(tmp_path):
 
 
 def test_known_solutions(tmp_path):
-    found = study.known_solutions(Report(tmp_path), coarse=True)
+    found = study.known_solutions(Report(tmp_path, coarse=True))
     for label, table in found.items():
         degree = 1 if "P1" in label else 2
         orders = np.log2(table[-2] / table[-1])[:2]
@@ -121,14 +121,14 @@ def test_known_solutions(tmp_path):
 
 
 def test_theorem_4_3(tmp_path):
-    for table in study.theorem_4_3(Report(tmp_path), coarse=True).values():
+    for table in study.theorem_4_3(Report(tmp_path, coarse=True)).values():
         assert np.all(np.log2(table[:-1] / table[1:]) > 0.7)
 
 
 @pytest.mark.slow
 def test_rates_of_the_fixed_points(tmp_path):
     """Theorems 3.2 and 4.5: linear convergence, with friction or without."""
-    rates = fixed_points(Report(tmp_path), coarse=True)
+    rates = fixed_points(Report(tmp_path, coarse=True))
     rows = {row["iteration"]: row for row in rows_of(tmp_path / "fixed-point-rates.csv")}
     assert set(rows) == set(rates)
     for label, rate in rates.items():

@@ -181,7 +181,7 @@ def test_known_contacts_on_moved_cells(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(cell_orders, "CELLS", {(2, 1): (8, 32), (2, 2): (8, 16)})
     known = {name: row for name, row in cell_orders.KNOWN.items() if row[1] == 2}
     monkeypatch.setattr(cell_orders, "KNOWN", known)
-    found = cell_orders.orders(Report(tmp_path), coarse=False)
+    found = cell_orders.orders(Report(tmp_path))
     assert len(found) == 12
     for (_, _, _, degree), (displacement, _, dual) in found.items():
         assert displacement > (1.6, 2.0)[degree - 1]
@@ -203,5 +203,5 @@ def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:
 
 
 def test_tetrahedra_on_a_shaft_are_of_order_2_by_their_forces_alone(tmp_path) -> None:
-    found = curved_cells.rim(Report(tmp_path), coarse=True)
+    found = curved_cells.rim(Report(tmp_path, coarse=True))
     assert found["load"] > 3 > 2.5 > found["shaft"] > 1.9
