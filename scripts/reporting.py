@@ -64,7 +64,7 @@ class Report:
 
     @classmethod
     def of(cls, text: str, script: str, arguments: Sequence[str] | None = None) -> Report:
-        """Return what --out and --coarse ask for, the options that all these scripts have."""
+        """Return the report that --out and --coarse, options of every script, ask for."""
         given = parser(text, script).parse_args(arguments)
         return cls(given.out, given.coarse)
 
