@@ -17,8 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from dolfinx import fem, la
-from dolfinx.la import InsertMode
+from dolfinx import fem
 from dolfinx.mesh import compute_midpoints, entities_to_geometry
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -27,7 +26,7 @@ from scipy import sparse
 from contact.body.description import Body
 from contact.errors import InputError
 from contact.mesh.domain import Domain, members
-from contact.mesh.entities import Indices, cell_facets, distributed_components
+from contact.mesh.entities import Indices, cell_facets, distributed_components, sums_at
 from contact.model.body import Bolt, Electrode
 from contact.model.rigid import Rigid, numbers_at, rigid_motions
 from contact.ranks import summed
@@ -428,19 +427,16 @@ def _direction(
             f"bolt on {part!r}: the cut is not plane; accepted: facets in one plane", "bolt"
         )
     nodes = fem.locate_dofs_topological(space, d - 1, facets)
-    flags = la.vector(space.dofmap.index_map)
-    flags.array[nodes] = 1.0
-    flags.scatter_reverse(InsertMode.add)
-    flags.scatter_forward()
+    on_cut = sums_at(space.dofmap.index_map, nodes, 1.0) > 0
     cells = space.dofmap.list
-    touches = flags.array[cells] > 0
+    touches = on_cut[cells]
     count = np.arange(len(cells), dtype=np.int32)
     midpoints = compute_midpoints(mesh, d, count)[:, :d] if count.size else np.zeros((0, d))
     above = (midpoints - middle) @ normal > 0
     _check_through(domain, part, facets, touches.any(axis=1), above)
     made, moved = fem.Function(whole), touches & above[:, None]
     made.x.array.reshape(-1, d)[whole.dofmap.list[moved]] = -normal
-    own = np.flatnonzero(flags.array[: space.dofmap.index_map.size_local] > 0)
+    own = np.flatnonzero(on_cut[: space.dofmap.index_map.size_local])
     return made, own.astype(np.int32), normal, moved
 
 
@@ -453,13 +449,12 @@ def _check_through(
 ) -> None:
     """Refuse a cut that ends within the body: its sides are joined beside it. Collective."""
     mesh, d = domain.mesh, domain.dim
-    of_cells = cell_facets(mesh)
-    sides = la.vector(mesh.topology.index_map(d - 1), 2)
-    met = sides.array.reshape(-1, 2)
-    for side, those in enumerate((touches & above, touches & ~above)):
-        np.add.at(met[:, side], of_cells[those], 1.0)
-    sides.scatter_reverse(InsertMode.add)
-    joined = np.flatnonzero((met[: mesh.topology.index_map(d - 1).size_local] > 0).all(axis=1))
+    of_cells, index_map = cell_facets(mesh), mesh.topology.index_map(d - 1)
+    one, other = (
+        sums_at(index_map, of_cells[those], 1.0)[: index_map.size_local] > 0
+        for those in (touches & above, touches & ~above)
+    )
+    joined = np.flatnonzero(one & other)
     if domain.comm.allreduce(bool(np.setdiff1d(joined, facets).size), op=MPI.LOR):
         raise InputError(
             f"bolt on {part!r}: the cut ends within the body; accepted: all facets of a section",

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import ufl
-from dolfinx import fem, la
-from dolfinx.la import InsertMode
+from dolfinx import fem
 from dolfinx.mesh import compute_midpoints, entities_to_geometry
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from contact.errors import InputError
 from contact.linear.layout import Inclined
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, on_axis
+from contact.mesh.entities import sums_at
 from contact.mesh.geometry import facet_normals
 from contact.model.fields import Factor, Field, Moving, steady, values_at
 from contact.model.formula import Expression
@@ -246,11 +246,8 @@ def without_field(space: fem.FunctionSpace, cells: NDArray[np.int32]) -> Support
     """
     subspace = space.sub(space.dofmap.index_map_bs - 1)
     scalar, to_whole = collapse(subspace)
-    inside = fem.Function(scalar)
-    inside.x.array[scalar.dofmap.list[cells].ravel()] = 1.0
-    inside.x.scatter_reverse(InsertMode.add)
-    inside.x.scatter_forward()
-    nodes = np.flatnonzero(inside.x.array == 0).astype(np.int32)
+    inside = sums_at(scalar.dofmap.index_map, scalar.dofmap.list[cells], 1.0)
+    nodes = np.flatnonzero(inside == 0).astype(np.int32)
     dofs = [to_whole[nodes], nodes]
     return _nothing(subspace, fem.Function(scalar), dofs)
 
@@ -300,11 +297,7 @@ def nodal_normals(
     cells, place, normal = facet_normals(domain, part, degree)
     nodes = np.take_along_axis(space.dofmap.list[cells], shape.facet_nodes(degree)[place], axis=1)
     normal = np.broadcast_to(normal, (*nodes.shape, d))
-    total = la.vector(space.dofmap.index_map, d)
-    sums = total.array.reshape(-1, d)
-    np.add.at(sums, nodes, normal)
-    total.scatter_reverse(InsertMode.add)
-    total.scatter_forward()
+    sums = sums_at(space.dofmap.index_map, nodes, normal)
     length = np.linalg.norm(sums, axis=1, keepdims=True)
     mean = np.divide(sums, length, out=np.zeros_like(sums), where=length > 0)
     own = normal / np.linalg.norm(normal, axis=2, keepdims=True)

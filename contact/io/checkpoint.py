@@ -17,8 +17,6 @@ from typing import Any, TypeAlias
 from zipfile import BadZipFile
 
 import numpy as np
-from dolfinx import fem
-from dolfinx.la import InsertMode
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -28,6 +26,7 @@ from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.multipliers import Multipliers
 from contact.io.folder import write_whole
+from contact.mesh.entities import sums_at
 from contact.mesh.geometry import geometry_nodes
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -301,15 +300,8 @@ def _nodes(problem: ContactProblem) -> Array:
     body, d = problem.body, problem.dim
     mesh, space = body.domain.mesh, body.space
     cells = mesh.topology.index_map(d).size_local
-    corners = geometry_nodes(body.domain)
-    sums = fem.Function(fem.functionspace(mesh, ("Lagrange", body.degree, (d + 1,))))
-    own = np.concatenate([corners.mean(axis=1), np.ones((cells, 1))], axis=1)
-    links = sums.function_space.dofmap.list
-    np.add.at(sums.x.array.reshape(-1, d + 1), links[:cells], own[:, None, :])
-    sums.x.scatter_reverse(InsertMode.add)
-    sums.x.scatter_forward()
-    at_nodes = np.empty((len(body.nodal(body.zero_displacement())), d + 1))
-    at_nodes[space.dofmap.list] = sums.x.array.reshape(-1, d + 1)[links]
-    owned = body.owned // body.block_size
-    means = at_nodes[:owned, :d] / at_nodes[:owned, d:]
-    return np.concatenate([body.layout.points, means], axis=1)
+    own = np.concatenate([geometry_nodes(body.domain).mean(axis=1), np.ones((cells, 1))], axis=1)
+    links = space.dofmap.list[:cells]
+    each = np.broadcast_to(own[:, None], (*links.shape, d + 1))
+    sums = sums_at(space.dofmap.index_map, links, each)[: body.owned // body.block_size]
+    return np.concatenate([body.layout.points, sums[:, :d] / sums[:, d:]], axis=1)

@@ -17,17 +17,18 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from dolfinx import fem, has_adios2, io, la
+from dolfinx import fem, has_adios2, io
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
+from contact.mesh.entities import accumulated, with_ghosts
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import on_root
 from contact.results.contact_nodes import Grid, Values, contact_surface
-from contact.results.fields import DerivedFields, linear, unknowns
+from contact.results.fields import DerivedFields, linear, nodal_unknowns, unknowns
 from contact.results.solution import Solution
 
 #: A time, and the state then.
@@ -130,36 +131,18 @@ def body_share(
     """
     body, d = problem.body, problem.dim
     space, derived = body.space, derived or DerivedFields(body, state)
-    links, index_map = space.dofmap.list, space.dofmap.index_map
-    owned = body.domain.mesh.topology.index_map(d).size_local
     numbers, nodes, groups = _points_of(derived)
-    cells = numbers[links[:owned], derived.groups[:, None]]
+    cells = numbers[space.dofmap.list[: len(derived.groups)], derived.groups[:, None]]
     points = space.tabulate_dof_coordinates()[nodes, :d]
-
-    def nodal(function: fem.Function) -> Values:
-        """Return a function's values at the points."""
-        dofmap = function.function_space.dofmap
-        values = np.empty((index_map.size_local + index_map.num_ghosts, dofmap.index_map_bs))
-        values[links] = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list]
-        return _rows(values[nodes])
-
-    def mean(function: fem.Function) -> Values:
-        """Return a discontinuous function's means over the owned cells."""
-        dofmap = function.function_space.dofmap
-        values = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list[:owned]]
-        return _rows(values.mean(axis=1))
-
-    of_nodes, in_cells = unknowns(body, state.x), {}
-    at_points = {k: nodal(f) for k, f in of_nodes.items() if names is None or k in names}
-    if names is None or set(names) - set(of_nodes):
-        means, in_cells = derived.means()[groups, nodes], derived.cells()
-        at_points |= {
-            k: _rows(means[:, columns])
-            for k, columns in derived.columns.items()
-            if names is None or k in names
-        }
-    of_cells = {f"{k}_cell": mean(f) for k, f in in_cells.items() if names is None or k in names}
-    return Grid(points, cells, shape_of(body.domain.mesh), at_points, of_cells)
+    given, in_cells = nodal_unknowns(body, state.x), {}
+    at_points = {k: _rows(v[nodes]) for k, v in given.items() if names is None or k in names}
+    if names is None or set(names) - set(given):
+        means, of_cells = derived.means()[groups, nodes], derived.cell_means()
+        for name, columns in derived.columns.items():
+            if names is None or name in names:
+                at_points[name] = _rows(means[:, columns])
+                in_cells[f"{name}_cell"] = _rows(of_cells[:, columns])
+    return Grid(points, cells, shape_of(body.domain.mesh), at_points, in_cells)
 
 
 def _points_of(
@@ -172,21 +155,17 @@ def _points_of(
     """
     space, groups = derived.body.space, derived.groups
     index_map, count = space.dofmap.index_map, derived.group_count
-    vector = la.vector(index_map, count, dtype=np.int64)
-    there = vector.array.reshape(-1, count)
-    there[space.dofmap.list[: groups.size], groups[:, None]] = 1
-    vector.scatter_reverse(la.InsertMode.add)
-    own = there[: index_map.size_local]
-    nodes, of_group = np.nonzero(own)
+    numbers = np.zeros((index_map.size_local + index_map.num_ghosts, count), dtype=np.int64)
+    numbers[space.dofmap.list[: groups.size], groups[:, None]] = 1
+    nodes, of_group = np.nonzero(accumulated(index_map, numbers)[: index_map.size_local])
     # A node's first point stands where the node does, further ones behind all nodes.
     order = np.argsort(np.diff(nodes, prepend=-1) == 0, kind="stable")
     nodes, of_group = nodes[order], of_group[order]
     comm = derived.body.comm
     begin = comm.exscan(nodes.size) or 0
-    own[:] = -1
-    own[nodes, of_group] = begin + np.arange(nodes.size)
-    vector.scatter_forward()
-    return there, nodes, of_group
+    numbers[:] = -1
+    numbers[nodes, of_group] = begin + np.arange(nodes.size)
+    return with_ghosts(index_map, numbers), nodes, of_group
 
 
 def _rows(values: Values) -> Values:
@@ -245,13 +224,12 @@ def _at_corners(
     if derived.group_count == 1:
         return [linear(f) for f in _at_nodes(problem, state, derived)]
     found = [linear(f) for f in unknowns(problem.body, state.x).values()]
-    for name, function in derived.cells().items():
-        space = function.function_space
-        made = fem.Function(fem.functionspace(space.mesh, ("DG", 0, derived.shapes[name])))
-        made.name = name
-        values = function.x.array.reshape(-1, space.dofmap.index_map_bs)[space.dofmap.list]
-        made.x.array[:] = values.mean(axis=1).ravel()
-        found.append(made)
+    means, mesh = derived.cell_means(), problem.domain.mesh
+    for name, columns in derived.columns.items():
+        space = fem.functionspace(mesh, ("DG", 0, derived.shapes[name]))
+        found.append(fem.Function(space, name=name))
+        values = found[-1].x.array.reshape(-1, columns.stop - columns.start)
+        values[space.dofmap.list[: len(means), 0]] = means[:, columns]
     return found
 
 

@@ -53,6 +53,36 @@ def owned_among(
     return here, (numbers[here] - begin).astype(np.int32)
 
 
+def with_ghosts(index_map: IndexMap, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return rows at local entities, (n, ...), those at ghosts from their owners. Collective."""
+    vector = la.vector(index_map, int(np.prod(rows.shape[1:])), rows.dtype)
+    vector.array[:] = rows.ravel()
+    vector.scatter_forward()
+    return vector.array.reshape(rows.shape)
+
+
+def accumulated(index_map: IndexMap, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return the sums over all ranks of rows at local entities, (n, ...). Collective."""
+    vector = la.vector(index_map, int(np.prod(rows.shape[1:])), rows.dtype)
+    vector.array[:] = rows.ravel()
+    vector.scatter_reverse(la.InsertMode.add)
+    vector.scatter_forward()
+    return vector.array.reshape(rows.shape)
+
+
+def sums_at(
+    index_map: IndexMap, at: npt.NDArray[np.integer[Any]], values: npt.ArrayLike
+) -> npt.NDArray[np.float64]:
+    """Return the sums over all ranks of values at some local entities, (n, ...). Collective.
+
+    The entities have any shape, which that of the values begins with, if these are no number.
+    """
+    tail = np.shape(values)[np.ndim(at) :]
+    rows = np.zeros((index_map.size_local + index_map.num_ghosts, *tail))
+    np.add.at(rows, at, values)
+    return accumulated(index_map, rows)
+
+
 def cell_facets(mesh: dmesh.Mesh) -> Indices:
     """Return the facets of each local cell, shape (cells, facets); their connectivity is there."""
     dim = mesh.topology.dim
@@ -132,10 +162,7 @@ def distributed_components(
     here = here + comm.scan(count) - count
     total = comm.allreduce(count, op=MPI.SUM)
     # The numbers that a ghost has here and at its owner are of one component.
-    names = la.vector(index_map)
-    names.array[:] = here[:nodes]
-    names.scatter_forward()
-    there = names.array[owned:].astype(np.int64)
+    there = with_ghosts(index_map, here[:nodes].astype(np.int64))[owned:]
     pairs = [np.unique(np.column_stack([here[owned:nodes], there]), axis=0)]
     if keys is not None:
         rows = np.concatenate(comm.allgather(np.column_stack([keys, here[nodes:]])))

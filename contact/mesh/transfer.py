@@ -11,7 +11,7 @@ from dataclasses import replace
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem, la
+from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import deviations
 from contact.mesh.domain import Domain, exterior_facets
-from contact.mesh.entities import Indices, cell_facets, cells_at
+from contact.mesh.entities import Indices, cell_facets, cells_at, sums_at
 from contact.mesh.geometry import determinant, jacobians, unit_normals
 from contact.mesh.owners import Owners
 from contact.typing import Array
@@ -61,9 +61,11 @@ def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain,
         _follow(domain, fine, facets, owner[facets])
     parts = {name: facets[np.isin(owner[facets], old)] for name, old in domain.parts.items()}
     facets = np.arange(min(owner.size, fine.topology.index_map(tdim - 1).size_local))
+    of_coarse, owner = coarse.topology.index_map(tdim - 1), owner[: facets.size]
+    every = {name: sums_at(of_coarse, old, 1.0) > 0 for name, old in domain.inside.items()}
     inside = {
-        name: facets[np.isin(owner[: facets.size], _with_ghosts(coarse, old))].astype(np.int32)
-        for name, old in domain.inside.items()
+        name: facets[(owner >= 0) & within[owner]].astype(np.int32)
+        for name, within in every.items()
     }
     owned = parent[: fine.topology.index_map(tdim).size_local]
     regions = {
@@ -72,14 +74,6 @@ def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain,
     }
     named = replace(domain, mesh=fine, parts=parts, regions=regions, inside=inside)
     return replace(named, levels=domain.levels + (marked is None)), owned
-
-
-def _with_ghosts(mesh: dmesh.Mesh, owned: Indices) -> Indices:
-    """Add to a set of owned facets their ghosts on all ranks. Collective."""
-    marks = la.vector(mesh.topology.index_map(mesh.topology.dim - 1))
-    marks.array[owned] = 1.0
-    marks.scatter_forward()
-    return np.flatnonzero(marks.array).astype(np.int32)
 
 
 def _cut(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indices, Indices]:
@@ -212,15 +206,13 @@ def _follow(coarse: Domain, fine: dmesh.Mesh, facets: Indices, parents: Indices)
     every = exterior_facets(coarse.mesh)
     rest = np.setdiff1d(every, np.concatenate([every[:0], *coarse.parts.values()]))
     # Part by part: at an edge between two there is no common normal.
-    sums = la.vector(of_fine, d * d + d)
-    values = sums.array.reshape(-1, d + 1, d)
+    found = []
     for part in (*coarse.parts.values(), rest):
         inside = np.isin(parents, part)
-        nodes, normal, height = _heights(coarse, part, fine, facets[inside], parents[inside])
-        np.add.at(values[:, 0], nodes, height[:, None] * normal)
-        np.add.at(values[:, 1:], nodes, normal[:, :, None] * normal[:, None, :])
-    sums.scatter_reverse(la.InsertMode.add)
-    sums.scatter_forward()
+        found.append(_heights(coarse, part, fine, facets[inside], parents[inside]))
+    nodes, normal, height = map(np.concatenate, zip(*found, strict=True))
+    right, matrix = height[:, None] * normal, normal[:, :, None] * normal[:, None, :]
+    values = sums_at(of_fine, nodes, np.concatenate([right[:, None], matrix], axis=1))
     # The shortest shift s with n.s = h for the facets' normals n, in the least-squares sense.
     sizes, vectors = np.linalg.eigh(values[:, 1:])
     kept = sizes > APART * sizes[:, -1:]

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from dolfinx import fem, la
+from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
@@ -35,7 +35,7 @@ from contact.body.elements import MEAN_DILATATION, in_chunks
 from contact.body.materials import factor_of
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain, Indices, members, part_name
-from contact.mesh.entities import cell_facets, cells_at
+from contact.mesh.entities import accumulated, cell_facets, cells_at, sums_at, with_ghosts
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.mesh.owners import Owners
 from contact.model.body import Bolt
@@ -323,8 +323,7 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     closures = shape.facet_nodes(body.degree)[place]
     nodes = np.take_along_axis(body.space.dofmap.list[cells], closures, axis=1)
     index_map = body.space.dofmap.index_map
-    vector = la.vector(index_map, 3 + 2 * d)
-    values = vector.array.reshape(-1, 3 + 2 * d)
+    values = np.zeros((index_map.size_local + index_map.num_ghosts, 3 + 2 * d))
     normal_gap = interface.normal_gap(jump)
     values[interface.nodes.nodes] = np.column_stack(
         [
@@ -335,7 +334,7 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
             state.forces.friction,
         ]
     )
-    vector.scatter_forward()
+    values = with_ghosts(index_map, values)
     at, weights = rule(shape.facet, 4)
     found = shape.facet.lagrange(body.degree, at) @ values[nodes]
     contact, normal_gap, bound = (found[..., i] for i in range(3))
@@ -355,11 +354,8 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     ratio = np.divide(products, moved, out=np.ones_like(moved), where=moved > 0)
     # Beside a facet that touches with all of its nodes there is room, and b is h.
     touches = values[nodes, 0] > interface.negligible(jump, state.forces.contact)
-    within = la.vector(index_map)
-    within.array[nodes[touches.all(axis=1)]] = 1.0
-    within.scatter_reverse(la.InsertMode.add)
-    within.scatter_forward()
-    alone = ~np.any(touches & (within.array[nodes] > 0), axis=1)
+    within = sums_at(index_map, nodes[touches.all(axis=1)], 1.0) > 0
+    alone = ~np.any(touches & within[nodes], axis=1)
     moved *= 1 + alone * np.log(np.maximum(ratio, 1.0))
     np.add.at(squares, cells, np.minimum(products, moved))
     return squares
@@ -430,14 +426,9 @@ def _seen(
     domain: Domain, corners: NDArray[np.integer], hats: Array, sizes: Array, values: Array
 ) -> Array:
     """Return linear functions of mean values, (n, q, c), around vertices, (n, k). Collective."""
-    index_map = domain.mesh.geometry.index_map()
-    total = la.vector(index_map, values.shape[2] + 1)
-    sums = total.array.reshape(-1, values.shape[2] + 1)
     with_ones = np.concatenate([values, np.ones((*sizes.shape, 1))], axis=2)
-    np.add.at(sums, corners, np.einsum("nq,qk,nqc->nkc", sizes, hats, with_ones))
-    total.scatter_reverse(la.InsertMode.add)
-    total.scatter_forward()
-    found = sums[corners]
+    shares = np.einsum("nq,qk,nqc->nkc", sizes, hats, with_ones)
+    found = sums_at(domain.mesh.geometry.index_map(), corners, shares)[corners]
     # On the axis of revolution there is no area.
     means = found[..., :-1] / np.where(found[..., -1:] > 0, found[..., -1:], 1.0)
     return np.asarray(hats @ means)
@@ -464,11 +455,7 @@ def nodal_means(
         sums[:, :-1] += around @ here
         sums[:, -1] += around.sum(axis=1)
     if domain.comm.size > 1:
-        total = la.vector(index_map, sums.shape[1])
-        total.array[:] = sums.ravel()
-        total.scatter_reverse(la.InsertMode.add)
-        total.scatter_forward()
-        sums = total.array.reshape(sums.shape)
+        sums = accumulated(index_map, sums)
     with np.errstate(invalid="ignore"):
         means = np.asarray(sums[:, :-1] / sums[:, -1:])
     places = dofmap[cells, :corners]

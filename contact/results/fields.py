@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
-from dolfinx import fem, la
-from dolfinx.la import InsertMode
+from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 from ufl.core.expr import Expr
@@ -25,6 +24,7 @@ from contact.body.materials import form_law, piezo_with_constants
 from contact.history import BodyState, LinearisationPoint
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import disjoint_pieces
+from contact.mesh.entities import accumulated
 from contact.mesh.geometry import volumes
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem
@@ -82,13 +82,21 @@ def linear(function: fem.Function) -> fem.Function:
     return made
 
 
-def unknowns(body: BodyEquilibrium, x: Array, family: str = "Lagrange") -> dict[str, fem.Function]:
-    """Return the displacement and, for a piezoelectric body, the potential. Collective."""
-    u = body.nodal(x)[:, : body.dim]
-    given: dict[str, tuple[Array, tuple[int, ...]]] = {"displacement": (u, (body.dim,))}
+def nodal_unknowns(body: BodyEquilibrium, x: Array) -> dict[str, Array]:
+    """Return the displacement and, for a piezoelectric body, the potential, (nodes, components)."""
+    found = {"displacement": body.nodal(x)[:, : body.dim]}
     if body.piezoelectric:
-        given["potential"] = body.phi_scale * body.nodal(x)[:, body.dim :], ()
-    return {k: nodal_function(k, body.space, *value, family) for k, value in given.items()}
+        found["potential"] = body.phi_scale * body.nodal(x)[:, body.dim :]
+    return found
+
+
+def unknowns(body: BodyEquilibrium, x: Array, family: str = "Lagrange") -> dict[str, fem.Function]:
+    """Return them as functions. Collective."""
+    shapes: dict[str, tuple[int, ...]] = {"displacement": (body.dim,), "potential": ()}
+    return {
+        name: nodal_function(name, body.space, values, shapes[name], family)
+        for name, values in nodal_unknowns(body, x).items()
+    }
 
 
 def check_variables(body: BodyEquilibrium) -> None:
@@ -274,6 +282,14 @@ class DerivedFields:
             function.x.scatter_forward()
         return made
 
+    def cell_means(self) -> Array:
+        """Return the fields of the owned cells, at degree 2 means of their corners, (cells, k)."""
+        mesh, size = self.body.domain.mesh, sum(math.prod(s) for s in self.shapes.values())
+        found = np.zeros((mesh.topology.index_map(mesh.topology.dim).size_local, size))
+        for chosen, values in self.chunks():
+            found[chosen] = values[:, : shape_of(mesh).corners].mean(axis=1)
+        return found
+
     @cached_property
     def groups(self) -> NDArray[np.int32]:
         """Groups of the owned cells, one per set of regions, the same on all ranks. Collective."""
@@ -307,12 +323,8 @@ class DerivedFields:
             at_nodes = np.broadcast_to(values, (*dofs.shape, count)) * weight
             every = np.concatenate([at_nodes, weight], axis=2)
             np.add.at(sums, (groups[chosen, None], dofs), every)
-        vector = la.vector(index_map, count + 1)
         for group in sums:
-            vector.array[:] = group.ravel()
-            vector.scatter_reverse(InsertMode.add)
-            vector.scatter_forward()
-            group[:] = vector.array.reshape(group.shape)
+            group[:] = accumulated(index_map, group)
         with np.errstate(invalid="ignore"):
             means = np.asarray(sums[..., :-1] / sums[..., -1:])
         known = np.isfinite(means[..., 0])

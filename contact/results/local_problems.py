@@ -19,11 +19,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import combinations
-from math import comb
 from typing import NamedTuple
 
 import numpy as np
-from dolfinx import la
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
@@ -31,7 +29,7 @@ from scipy.sparse import csr_array
 from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.cells import INTERVAL, Shape, barycentric, rule, shape_of
 from contact.mesh.domain import Indices
-from contact.mesh.entities import cell_facets
+from contact.mesh.entities import accumulated, cell_facets, with_ghosts
 from contact.mesh.geometry import geometry_nodes, integration_weights, inverse, jacobians
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -55,54 +53,28 @@ def cubics(shape: Shape, at: Array) -> Array:
     Of simplices, one an edge, L_i L_j (L_i - L_j), and one a triangle, L_i L_j L_k, in barycentric
     coordinates. Of others that of an interval along each axis, times quadratics along the others.
     """
-    if not shape.simplex:
-        return np.concatenate([one for one, _ in _products(shape, at)], axis=1)
-    at = barycentric(at)
-    size = range(at.shape[1])
-    edges = [at[:, i] * at[:, j] * (at[:, i] - at[:, j]) for i, j in combinations(size, 2)]
-    faces = [at[:, i] * at[:, j] * at[:, k] for i, j, k in combinations(size, 3)]
-    return np.stack(edges + faces, axis=1)
+    if shape.simplex:
+        at = barycentric(at)
+        size = range(at.shape[1])
+        edges = [at[:, i] * at[:, j] * (at[:, i] - at[:, j]) for i, j in combinations(size, 2)]
+        faces = [at[:, i] * at[:, j] * at[:, k] for i, j, k in combinations(size, 3)]
+        return np.stack(edges + faces, axis=1)
+    cubic = (at * (1 - at) * (1 - 2 * at))[:, :, None]
+    quadratic = INTERVAL.lagrange(2, at.reshape(-1, 1)).reshape(*at.shape, 3)
+    found = []
+    for axis in range(shape.dim):
+        product = np.ones((len(at), 1))
+        for k in range(shape.dim):
+            factor = (cubic if k == axis else quadratic)[:, k]
+            product = (product[:, :, None] * factor[:, None, :]).reshape(len(at), -1)
+        found.append(product)
+    return np.concatenate(found, axis=1)
 
 
 def _derivatives(shape: Shape, at: Array) -> Array:
-    """Return the derivatives of `cubics` by the coordinates of the reference cell."""
-    if not shape.simplex:
-        return np.concatenate([by for _, by in _products(shape, at)], axis=1)
-    at = barycentric(at)
-    size = at.shape[1]
-    by = np.zeros((len(at), size * (size - 1) // 2 + comb(size, 3), size))
-    for n, (i, j) in enumerate(combinations(range(size), 2)):
-        by[:, n, i] = at[:, j] * (2 * at[:, i] - at[:, j])
-        by[:, n, j] = at[:, i] * (at[:, i] - 2 * at[:, j])
-    first = size * (size - 1) // 2
-    for n, face in enumerate(combinations(range(size), 3), first):
-        for i in face:
-            by[:, n, i] = np.prod(at[:, [k for k in face if k != i]], axis=1)
-    return by[..., 1:] - by[..., :1]
-
-
-def _products(shape: Shape, at: Array) -> Iterator[tuple[Array, Array]]:
-    """Yield the functions along each axis, (q, n), and their derivatives, (q, n, dim)."""
-    x, dim = at[:, :, None], shape.dim
-    cubic = (x * (1 - x) * (1 - 2 * x), 1 - 6 * x + 6 * x**2)
-    quadratic = (INTERVAL.lagrange(2, at.reshape(-1, 1)), INTERVAL.gradients(2, at.reshape(-1, 1)))
-    smooth = [np.asarray(values).reshape(len(at), dim, 3) for values in quadratic]
-    for axis in range(dim):
-        order = [list(part) for part in (cubic, smooth)]
-        yield (
-            _product(order, axis),
-            np.stack([_product(order, axis, along) for along in range(dim)], axis=-1),
-        )
-
-
-def _product(factors: list[list[Array]], axis: int, along: int = -1) -> Array:
-    """Return products of a cubic along one axis and quadratics along others, shape (q, n)."""
-    # Of the factor that belongs to the axis `along` the derivative is taken.
-    found = np.ones((len(factors[0][0]), 1))
-    for k in range(factors[0][0].shape[1]):
-        one = factors[k != axis][k == along][:, k]
-        found = (found[:, :, None] * one[:, None, :]).reshape(len(found), -1)
-    return found
+    """Return the derivatives of `cubics` by the coordinates of the reference cell, (q, n, dim)."""
+    at_nodes = cubics(shape, shape.nodes(3))  # which tell them: they are of degree 3
+    return np.asarray(np.einsum("qkr,kn->qnr", shape.gradients(3, at), at_nodes))
 
 
 class Basis(NamedTuple):
@@ -317,14 +289,11 @@ def _contact_traction(problem: ContactProblem, state: State) -> Array:
     # Weiss and Wohlmuth, Math. Comp. 78, 2009. No numbers at nodes without a multiplier.
     body, interface = problem.body, problem.interface
     pressure = interface.pressure(problem.nodal(state), state.forces)
-    found = la.vector(body.space.dofmap.index_map, body.dim)
-    found.array[:] = np.nan
-    at_nodes = found.array.reshape(-1, body.dim)
-    at_nodes[interface.nodes.nodes] = (
+    found = np.full_like(body.nodal(state.x)[:, : body.dim], np.nan)
+    found[interface.nodes.nodes] = (
         -pressure[:, None] * interface.nodes.normal - state.forces.friction
     )
-    found.scatter_forward()
-    return at_nodes
+    return with_ghosts(body.space.dofmap.index_map, found)
 
 
 def _loads(body: BodyEquilibrium, time: float) -> tuple[Array, Array]:
@@ -366,12 +335,8 @@ class Sides:
 
     def exchanged(self, rows: Array) -> Array:
         """Return the sums over all ranks of values by place, (facets m, b). Collective."""
-        width = self.places.shape[2] * rows.shape[1]
-        total = la.vector(self._index_map, width)
-        total.array[:] = rows.ravel()
-        total.scatter_reverse(la.InsertMode.add)
-        total.scatter_forward()
-        return np.asarray(total.array.reshape(rows.shape))
+        by_facet = rows.reshape(self._count, -1)
+        return np.asarray(accumulated(self._index_map, by_facet).reshape(rows.shape))
 
     def sums(self, values: Array) -> Array:
         """Return the sums, as the values of shape (cells, facets, m, b). Collective."""
