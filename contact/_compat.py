@@ -15,8 +15,11 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import dolfinx
+import mpi4py
 import numpy as np
 import numpy.typing as npt
+import ufl
 from dolfinx import fem, graph
 from dolfinx.common import IndexMap
 from dolfinx.mesh import Mesh
@@ -243,9 +246,7 @@ def blas_among(paths: Iterable[str]) -> tuple[str, str]:
 
 
 def blas() -> tuple[str, str]:
-    """Return name and path of the BLAS that this process has loaded, after loading PETSc."""
-    from petsc4py import PETSc  # noqa: F401  loads the library
-
+    """Return name and path of the BLAS that this process has loaded, by PETSc for instance."""
     maps = Path("/proc/self/maps")
     if not maps.exists():
         return "unknown", ""
@@ -255,13 +256,6 @@ def blas() -> tuple[str, str]:
 
 def versions() -> dict[str, str]:
     """Return the versions of Python, of the libraries, and the BLAS."""
-    import dolfinx
-    import mpi4py
-    import numpy
-    import ufl
-    from mpi4py import MPI
-    from petsc4py import PETSc
-
     vendor, numbers = MPI.get_vendor()
     return {
         "python": platform.python_version(),
@@ -270,7 +264,7 @@ def versions() -> dict[str, str]:
         "petsc": ".".join(str(part) for part in PETSc.Sys.getVersion()),
         "mpi4py": mpi4py.__version__,
         "mpi": f"{vendor} v{'.'.join(str(part) for part in numbers)}",
-        "numpy": numpy.__version__,
+        "numpy": np.__version__,
         "blas": blas()[0],
     }
 

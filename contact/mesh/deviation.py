@@ -107,7 +107,7 @@ def _with_rings(owners: Owners, *arrays: NDArray[Any]) -> tuple[NDArray[Any], ..
 
 
 def _runs(
-    known: NDArray[np.int64], asked: NDArray[np.int64]
+    known: NDArray[np.integer[Any]], asked: NDArray[np.integer[Any]]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return all pairs (row of `asked`, place in the ascending `known`) of equal values."""
     begin, end = (np.searchsorted(known, asked, side=side) for side in ("left", "right"))  # type: ignore[call-overload]
@@ -284,16 +284,13 @@ def _between(
     # have nearly all of the weight: those beyond which the curvature does not change.
     largest = np.abs(value).max(axis=1)
     largest[largest == 0] = 1.0
-    begin = np.searchsorted(pairs[0], np.arange(len(points) + 1))
     middle = points[corners[:, :2]].mean(axis=1)
     weights, jumps, totals, changes = (np.zeros_like(value) for _ in range(4))
     for k in range(corners.shape[1]):
         corner = corners[:, k]
         # The neighbours of the corner, facet by facet; those away from the edge have a share.
-        counts = np.diff(begin)[corner]
-        of = np.repeat(np.arange(len(corners)), counts)
-        last = np.cumsum(counts)
-        beyond = pairs[1][np.arange(of.size) + np.repeat(begin[corner] - last + counts, counts)]
+        of, place = _runs(pairs[0], corner)
+        beyond = pairs[1][place]
         outward = points[corner] - middle
         way = np.einsum("pd,pd->p", points[beyond] - points[corner[of]], outward[of])
         share = np.maximum(way, 0.0)

@@ -8,20 +8,18 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+from scipy.spatial.transform import Rotation
 
 from contact.errors import InputError, shown
 from contact.mesh.domain import Domain, exterior_facets, with_names
 
 
 def rotate(mesh: dmesh.Mesh, degrees: float, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> None:
-    """Turn a mesh in place about an axis through the origin (Rodrigues' formula)."""
-    if degrees == 0.0:
-        return
-    a, b, c = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    cross = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-    angle = np.deg2rad(degrees)
-    turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    mesh.geometry.x[:] = mesh.geometry.x @ turn.T
+    """Turn a mesh in place about an axis through the origin."""
+    if degrees != 0.0:
+        way = degrees * np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+        turn = Rotation.from_rotvec(way, degrees=True).as_matrix()
+        mesh.geometry.x[:] = mesh.geometry.x @ turn.T
 
 
 #: Sides of the generators: name -> (axis, end), end 0 at the lower coordinate.

@@ -350,20 +350,17 @@ def charges(problem: ContactProblem) -> Functionals:
     return found
 
 
-def potentials(problem: ContactProblem) -> Functionals:
-    """Return the potentials of electrodes where they are unknown."""
+def of_members(problem: ContactProblem, kind: type, name: str) -> Functionals:
+    """Return the unknowns of all electrodes, or of all bolts."""
     return {
-        f"potential_{part}": Weighted(partial(_unknown, index=i, i=0))
-        for i, part in _members(problem, Electrode)
+        f"{name}_{part}": Weighted(partial(_unknown, index=i, i=0))
+        for i, part in _members(problem, kind)
     }
 
 
-def bolt_shortenings(problem: ContactProblem) -> Functionals:
-    """Return the shortenings of bolts."""
-    return {
-        f"bolt_shortening_{part}": Weighted(partial(_unknown, index=i, i=0))
-        for i, part in _members(problem, Bolt)
-    }
+#: Potentials of electrodes where they are unknown, and shortenings of bolts.
+potentials = partial(of_members, kind=Electrode, name="potential")
+bolt_shortenings = partial(of_members, kind=Bolt, name="bolt_shortening")
 
 
 def rigid_motions(problem: ContactProblem) -> Functionals:

@@ -297,10 +297,6 @@ def _error(given: Any) -> float:
     return float("nan") if given.error is None else float(given.error.relative)
 
 
-def _item(values: Any, index: int) -> Any:
-    return None if values is None else values[index]
-
-
 _ALL = (SUMMARY, STEPS, SWEEP)
 _MESHES = (*_ALL, ADAPT)
 _TABLES = (STEPS, SWEEP, ADAPT)
@@ -441,7 +437,7 @@ _RUN = (
     Quantity(
         "max_strain", "",
         "Largest Frobenius norm of ε in the middle of a cell; linear kinematics is for small ones.",
-        lambda r: _item(r.deformation, 0),
+        lambda r: r.deformation and r.deformation[0],
     ),
     Quantity(
         "volume_ratio", "", "Least and largest deformed volume of a cell over its own.",
@@ -572,21 +568,22 @@ _RUN = (
     ),
     Quantity(
         "driven", "length", "Mean displacement of the part that is moved or loaded in time.",
-        lambda r: _item(r.driven, 0), (STEPS,), VECTOR, functionals=f.driven_displacements,
+        lambda r: r.driven and r.driven[0], (STEPS,), VECTOR, functionals=f.driven_displacements,
     ),
     Quantity(
         "driven_force", "force",
         "Force of its own supports and loads on it: with `driven_x` it makes the loop.",
-        lambda r: _item(r.driven, 1), (STEPS,), VECTOR, functionals=f.driving_forces,
+        lambda r: r.driven and r.driven[1], (STEPS,), VECTOR, functionals=f.driving_forces,
     ),
     Quantity("notes", "", "Assumptions that are met, or have not been checked, in words."),
     Quantity("warnings", "", "Reasons for care, in words."),
     Quantity(
-        "phi_min", "potential", "Least potential at a node.", lambda r: _item(r.potential_range, 0),
+        "phi_min", "potential", "Least potential at a node.",
+        lambda r: r.potential_range and r.potential_range[0],
     ),
     Quantity(
         "phi_max", "potential", "Largest potential at a node.",
-        lambda r: _item(r.potential_range, 1),
+        lambda r: r.potential_range and r.potential_range[1],
     ),
     Quantity(
         "total_charge", "charge", "Sum of all charges: 0 up to the tolerance, by Gauss's law.",

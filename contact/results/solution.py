@@ -247,7 +247,11 @@ class Solution(Solved):
             return None if self.energies is None else self.energies.plastic
         if not self.steps:
             return body.laws.energies(self.state)[0]
-        return sum(float(step.row["plastic_dissipation"]) for step in self.steps)
+        return self._in_steps("plastic_dissipation")
+
+    def _in_steps(self, column: str) -> float:
+        """Return the sum of a column over the steps."""
+        return sum(float(step.row[column]) for step in self.steps)
 
     @property
     def contact_force(self) -> Array:
@@ -268,15 +272,9 @@ class Solution(Solved):
         found = contact_shares(self.problem, self.state, self.status)
         if not self.steps:
             return found
-        alone = len(found) == 1
+        end = "" if len(found) == 1 else "_{}"
         return {
-            name: replace(
-                share,
-                dissipation=sum(
-                    float(step.row["dissipation" if alone else f"dissipation_{name}"])
-                    for step in self.steps
-                ),
-            )
+            name: replace(share, dissipation=self._in_steps("dissipation" + end.format(name)))
             for name, share in found.items()
         }
 
@@ -345,7 +343,7 @@ class Solution(Solved):
     def dissipation(self) -> float:
         """The energy that friction has dissipated, in all steps of an evolution. Collective."""
         if self.steps:
-            return sum(float(step.row["dissipation"]) for step in self.steps)
+            return self._in_steps("dissipation")
         return dissipated(self.problem, self.state)
 
     @property
