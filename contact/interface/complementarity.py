@@ -95,8 +95,8 @@ def interface_residuals(
 def worst(residuals: Array, floors: Array) -> tuple[Array, Array]:
     """Return the largest residual of each row, above its floor if any is, and its floor."""
     above = np.where(residuals <= floors, -1.0, residuals)
-    some = (above >= 0) | np.isnan(above)
-    chosen = np.where(some.any(axis=1, keepdims=True), above, residuals)
+    exceeds = (above >= 0) | np.isnan(above)
+    chosen = np.where(exceeds.any(axis=1, keepdims=True), above, residuals)
     columns = np.argmax(chosen, axis=1)[:, None]  # NaN counts as the largest
     return (
         np.take_along_axis(residuals, columns, axis=1)[:, 0],

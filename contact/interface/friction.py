@@ -74,11 +74,11 @@ class GroupedSmoothing(Grouped[Smoothing]):
 
     def __call__(self, values: Array) -> Array:
         """Return R applied to nodal values, shape (n,). Collective."""
-        return self.at_nodes(lambda smoothing, own: smoothing(own), values)
+        return self.at_nodes(lambda smoothing, nodal: smoothing(nodal), values)
 
     def transposed(self, values: Array) -> Array:
         """Return R^T applied to nodal values, shape (n,). Collective."""
-        return self.at_nodes(lambda smoothing, own: smoothing.transposed(own), values)
+        return self.at_nodes(lambda smoothing, nodal: smoothing.transposed(nodal), values)
 
     @property
     def radius(self) -> float:
@@ -88,14 +88,14 @@ class GroupedSmoothing(Grouped[Smoothing]):
 
 def _mollifier(nodes: ContactNodes, radius: float) -> PETSc.Mat:
     """Return R, its rows and columns divided among the ranks as the nodes are. Collective."""
-    own, reach = nodes.nodes.size, radius * (1 - 1e-9)
-    first = nodes.comm.scan(own) - own
-    numbers = np.arange(first, first + own, dtype=float)
+    count, reach = nodes.nodes.size, radius * (1 - 1e-9)
+    first = nodes.comm.scan(count) - count
+    numbers = np.arange(first, first + count, dtype=float)
     values = np.column_stack([nodes.points, nodes.weight, numbers])
     near = neighbours(nodes.comm, nodes.points, values, radius)
     points, weight, column = near[:, : nodes.dim], near[:, -2], near[:, -1].astype(PETSc.IntType)
-    if own == 0:
-        pairs = sparse.coo_array((own, len(near)))
+    if count == 0:
+        pairs = sparse.coo_array((count, len(near)))
     else:
         pairs = cKDTree(nodes.points).sparse_distance_matrix(
             cKDTree(points), reach, output_type="coo_matrix"
@@ -105,14 +105,14 @@ def _mollifier(nodes: ContactNodes, radius: float) -> PETSc.Mat:
         omega = _ring_mean(nodes.points[row], points[col], radius)
     else:
         omega = _omega(pairs.data**2, radius)
-    every = nodes.comm.allreduce(own)
-    part = sparse.csr_array((omega * weight[col], (row, column[col])), (own, every))
+    total = nodes.comm.allreduce(count)
+    part = sparse.csr_array((omega * weight[col], (row, column[col])), (count, total))
     part = sparse.csr_array(sparse.diags_array(1 / part.sum(axis=1)) @ part)
     part.sort_indices()
     csr = (part.indptr.astype(PETSc.IntType), part.indices.astype(PETSc.IntType), part.data)
-    made = PETSc.Mat().createAIJ(((own, every), (own, every)), csr=csr, comm=nodes.comm)
-    made.assemble()
-    return made
+    mollifier = PETSc.Mat().createAIJ(((count, total), (count, total)), csr=csr, comm=nodes.comm)
+    mollifier.assemble()
+    return mollifier
 
 
 def _omega(square: Array, radius: float) -> Array:
@@ -141,35 +141,35 @@ def law_at(friction: Friction, nodes: ContactNodes) -> FrictionLaw | None:
     Refuses bounds and coefficients that are negative or no number at a node, or without slip, and
     wrong derivatives, maxima and Lipschitz constants.
     """
-    given: Any = friction.mu
+    mu: Any = friction.mu
     if friction.law == "none":
         return None
     if friction.law == "tresca":
         assert friction.bound is not None  # required
         bound = _at("friction.bound", friction.bound, nodes)
         return Tresca(bound) if nodes.maximum(bound) > 0 else None
-    if hasattr(given, "by_slip"):
+    if hasattr(mu, "by_slip"):
         with on_all_ranks(nodes.comm):
-            _check_law(given)
-        return cast(FrictionLaw, given)
-    if isinstance(given, Expression) and given.is_constant:
-        return Coulomb(ConstantCoefficient(given.value)) if given.value > 0 else None
-    if not hasattr(given, "derivative"):
-        mu = _at("friction.mu", given, nodes)
-        return Coulomb(ConstantCoefficient(mu)) if nodes.maximum(mu) > 0 else None
-    # Ranks without nodes ask too: mistakes are found by all.
-    rest = np.zeros(3)
+            _check_law(mu)
+        return cast(FrictionLaw, mu)
+    if isinstance(mu, Expression) and mu.is_constant:
+        return Coulomb(ConstantCoefficient(mu.value)) if mu.value > 0 else None
+    if not hasattr(mu, "derivative"):
+        nodal_mu = _at("friction.mu", mu, nodes)
+        return Coulomb(ConstantCoefficient(nodal_mu)) if nodes.maximum(nodal_mu) > 0 else None
+    # Ranks without nodes evaluate the law too: all of them raise its errors.
+    zero = np.zeros(3)
     with on_all_ranks(nodes.comm), naming("Friction: mu"):
-        resists = real(given(rest), rest.shape, EACH)
+        resists = real(mu(zero), zero.shape, EACH)
     with on_all_ranks(nodes.comm), naming("Friction: mu: derivative"):
-        slope = real(given.derivative(rest), rest.shape, EACH)
+        slope = real(mu.derivative(zero), zero.shape, EACH)
         check_finite(slope, lambda _: "without slip")
     with on_all_ranks(nodes.comm):
-        check_slope("Friction: mu: derivative", given, given.derivative, SAMPLES)
-        _check_constants("Friction: mu", Coulomb(given))
+        check_slope("Friction: mu: derivative", mu, mu.derivative, SAMPLES)
+        _check_constants("Friction: mu", Coulomb(mu))
     _check("Friction: coefficient without slip", resists, nodes)
-    most = nodes.comm.allreduce(given.maximum, op=MPI.MAX)
-    return Coulomb(given) if most > 0 else None
+    most = nodes.comm.allreduce(mu.maximum, op=MPI.MAX)
+    return Coulomb(mu) if most > 0 else None
 
 
 def _check_law(law: FrictionLaw) -> None:
@@ -180,31 +180,31 @@ def _check_law(law: FrictionLaw) -> None:
         ("by_pressure", lambda p: law(slip, p), lambda p: law.by_pressure(slip, p), pressure),
     ):
         check_slope(f"Friction: law: {name}", bound, slope, at)
-    rest = np.zeros(3)
+    zero = np.zeros(3)
     for name, value in (("s", law), ("by_slip", law.by_slip), ("by_pressure", law.by_pressure)):
         with naming(f"Friction: law: {name}"), np.errstate(all="ignore"):
-            check_finite(real(value(rest, rest), rest.shape, EACH), lambda _: "without pressure")
+            check_finite(real(value(zero, zero), zero.shape, EACH), lambda _: "without pressure")
     _check_constants("Friction: law", law)
 
 
 def _check_constants(name: str, law: FrictionLaw) -> None:
     """Refuse constants that are no numbers >= 0, and a maximum that s/p exceeds at samples."""
     for key in ("maximum", "lipschitz"):
-        given = getattr(law, key)
-        fits = isinstance(given, int | float | np.number) and given >= 0
-        expect(f"{name}: {key}", given, "a number >= 0, or infinity", fits)
+        constant = getattr(law, key)
+        fits = isinstance(constant, int | float | np.number) and constant >= 0
+        expect(f"{name}: {key}", constant, "a number >= 0, or infinity", fits)
     slip, pressure = np.tile(SAMPLES, PRESSURES.size), np.repeat(PRESSURES, SAMPLES.size)
-    found = sampled(name, slip.shape, lambda: law(slip, pressure))
-    if found is not None:
-        largest = float(np.nanmax(found[0] / pressure, initial=0.0))
+    bounds = sampled(name, slip.shape, lambda: law(slip, pressure))
+    if bounds is not None:
+        largest = float(np.nanmax(bounds[0] / pressure, initial=0.0))
         fits = largest <= law.maximum * (1 + 1e-9)
         words = f"an upper bound of s/p, which is {largest:.4g} at a sample"
         expect(f"{name}: maximum", law.maximum, words, fits)
 
 
-def _at(name: str, given: Field | Moving, nodes: ContactNodes) -> Array:
+def _at(name: str, field: Field | Moving, nodes: ContactNodes) -> Array:
     """Return a bound or coefficient at contact nodes. Collective."""
-    values = values_at(given, nodes.points, 1.0, name, nodes.comm)
+    values = values_at(field, nodes.points, 1.0, name, nodes.comm)
     _check(name, values, nodes)
     return values
 
@@ -297,11 +297,13 @@ def joined_friction(
     frictions: Sequence[Friction], geometries: Sequence[Geometry], nodes: ContactNodes
 ) -> NodalFriction:
     """Return friction at the nodes of all contacts, joined before. Collective."""
-    pieces = [geometry.nodes for geometry in geometries]
-    pairs = list(zip(frictions, pieces, strict=True))
-    smoothing = GroupedSmoothing.of((Smoothing(own, given.radius) for given, own in pairs), pieces)
-    laws, law = [law_at(given, own) for given, own in pairs], None
+    groups = [geometry.nodes for geometry in geometries]
+    pairs = list(zip(frictions, groups, strict=True))
+    smoothing = GroupedSmoothing.of(
+        (Smoothing(group, friction.radius) for friction, group in pairs), groups
+    )
+    laws, law = [law_at(friction, group) for friction, group in pairs], None
     if any(laws):
-        every = [NO_FRICTION if own is None else own for own in laws]
-        law = GroupedFriction.of(every, pieces)
+        filled = [NO_FRICTION if law is None else law for law in laws]
+        law = GroupedFriction.of(filled, groups)
     return NodalFriction(law, smoothing, SlipHistory.rest(nodes))

@@ -41,14 +41,14 @@ class Grouped(Generic[LawType]):
     @classmethod
     def of(cls, laws: Iterable[LawType], nodes: Sequence[ContactNodes]) -> Self:
         """Return the laws of the nodes of each contact as one."""
-        ends = np.cumsum([0, *(piece.nodes.size for piece in nodes)])
+        ends = np.cumsum([0, *(group.nodes.size for group in nodes)])
         return cls(tuple(laws), tuple(int(end) for end in ends))
 
-    def at_nodes(self, value: Callable[..., Value], *given: Array) -> Array:
+    def at_nodes(self, value: Callable[..., Value], *arguments: Array) -> Array:
         """Return the values of each law at its own nodes: `value` of the law and its arguments."""
         parts = []
         for law, (begin, end) in zip(self.laws, pairwise(self.offsets), strict=True):
-            values = value(law, *(argument[begin:end] for argument in given))
+            values = value(law, *(argument[begin:end] for argument in arguments))
             parts.append(np.broadcast_to(np.asarray(values, dtype=float), (end - begin,)))
         return np.concatenate(parts)
 
@@ -70,11 +70,11 @@ class GroupedConductivity(Grouped[Conductivity]):
 
     def at(self, s: Any, pressed: Any, loaded: Any) -> Array:
         """Return psi."""
-        return self.at_nodes(lambda psi, *own: psi.at(*own), s, pressed, loaded)
+        return self.at_nodes(lambda psi, *arguments: psi.at(*arguments), s, pressed, loaded)
 
     def gap_slope(self, s: Any, pressed: Any) -> Array:
         """Return the derivative of psi by the gap."""
-        return self.at_nodes(lambda psi, *own: psi.gap_slope(*own), s, pressed)
+        return self.at_nodes(lambda psi, *arguments: psi.gap_slope(*arguments), s, pressed)
 
     @property
     def k_e(self) -> float:
@@ -111,11 +111,13 @@ class GroupedFriction(Grouped[FrictionLaw]):
     def largest(self, pressure: Array) -> Array:
         """Return upper bounds of s for pressures up to given ones; infinite without one."""
 
-        def most(law: FrictionLaw, own: Array) -> Value:
+        def most(law: FrictionLaw, nodal_pressure: Array) -> Value:
             if isinstance(law, Tresca):
                 return law.bound
-            some = (own > 0) & (law.maximum > 0)
-            return np.multiply(law.maximum, own, out=np.zeros_like(own), where=some)
+            resists = (nodal_pressure > 0) & (law.maximum > 0)
+            return np.multiply(
+                law.maximum, nodal_pressure, out=np.zeros_like(nodal_pressure), where=resists
+            )
 
         return self.at_nodes(most, pressure)
 
@@ -135,44 +137,45 @@ NO_LAYER = Layer(0.0, Compliance(np.inf), PotentialFactor(0.0))
 NO_CONDUCTOR = Conductor(PerfectConductivity(0.0), 0.0, Truncation(np.inf))
 
 
-def joined_layers(given: Sequence[Layer | None], geometries: Sequence[Geometry]) -> Layer | None:
-    """Return the layers of all contacts as one; None where there is none."""
-    if not any(given):
+def joined_layers(layers: Sequence[Layer | None], geometries: Sequence[Geometry]) -> Layer | None:
+    """Return the layers of all contacts as one; None without layers."""
+    if not any(layers):
         return None
-    pieces, layers = [geometry.nodes for geometry in geometries], [own or NO_LAYER for own in given]
+    groups = [geometry.nodes for geometry in geometries]
+    filled = [layer or NO_LAYER for layer in layers]
     return Layer(
-        np.repeat([own.thickness for own in layers], [piece.nodes.size for piece in pieces]),
-        GroupedLaw.of((own.p_nu for own in layers), pieces),
-        GroupedLaw.of((own.h_nu for own in layers), pieces),
-        _alike([own.lagged for own in given if own is not None]),
+        np.repeat([layer.thickness for layer in filled], [group.nodes.size for group in groups]),
+        GroupedLaw.of((layer.p_nu for layer in filled), groups),
+        GroupedLaw.of((layer.h_nu for layer in filled), groups),
+        _alike([layer.lagged for layer in layers if layer is not None]),
     )
 
 
 def joined_conductors(
-    given: Sequence[Conductor | None], pieces: Sequence[ContactNodes]
+    conductors: Sequence[Conductor | None], groups: Sequence[ContactNodes]
 ) -> Conductor | None:
-    """Return the conductors of all contacts as one, given their nodes; None where there is none."""
-    if len(given) == 1 or not any(given):
-        return given[0]
-    conductors = [own or NO_CONDUCTOR for own in given]
-    sizes = [piece.nodes.size for piece in pieces]
+    """Return the conductors of all contacts as one, on their nodes; None without conductors."""
+    if len(conductors) == 1 or not any(conductors):
+        return conductors[0]
+    filled = [conductor or NO_CONDUCTOR for conductor in conductors]
+    sizes = [group.nodes.size for group in groups]
 
     def phi_f(time: float) -> Array:
         """Return the potentials of the foundations at a time."""
-        return np.repeat([float(own.at(time).phi_f) for own in conductors], sizes)
+        return np.repeat([float(conductor.at(time).phi_f) for conductor in filled], sizes)
 
-    moving = any(own.phi_f_at is not None for own in conductors)
+    moving = any(conductor.phi_f_at is not None for conductor in filled)
     return Conductor(
-        GroupedConductivity.of((own.psi for own in conductors), pieces),
-        np.repeat([own.phi_f for own in conductors], sizes),
-        GroupedLaw.of((own.phi_l for own in conductors), pieces),
-        _alike([own.lagged for own in given if own is not None]),
+        GroupedConductivity.of((conductor.psi for conductor in filled), groups),
+        np.repeat([conductor.phi_f for conductor in filled], sizes),
+        GroupedLaw.of((conductor.phi_l for conductor in filled), groups),
+        _alike([conductor.lagged for conductor in conductors if conductor is not None]),
         phi_f if moving else None,
     )
 
 
 def joined_fixed_conducting(
-    given: Sequence[Conductor | None],
+    conductors: Sequence[Conductor | None],
     geometries: Sequence[Geometry],
     law: FoundationLaw,
     begin: int,
@@ -181,19 +184,19 @@ def joined_fixed_conducting(
 
     `law` is that at the contact nodes, `begin` the global number of the first node of this rank.
     """
-    there = [
-        (geometry.fixed_conducting, own)
-        for geometry, own in zip(geometries, given, strict=True)
+    conducting = [
+        (geometry.fixed_conducting, conductor)
+        for geometry, conductor in zip(geometries, conductors, strict=True)
         if geometry.fixed_conducting is not None
     ]
-    if not there:
+    if not conducting:
         return None
-    pieces = [own for own, _ in there]
-    nodes = side_by_side(pieces)
+    groups = [group for group, _ in conducting]
+    nodes = side_by_side(groups)
     if law.nodes.coupling is not None:
         coupling = law.nodes.coupling.at(nodes.nodes.astype(np.int64) + begin)
         nodes = replace(nodes, coupling=coupling)
-    conductor = joined_conductors([own for _, own in there], pieces)
+    conductor = joined_conductors([conductor for _, conductor in conducting], groups)
     return replace(law, nodes=nodes, layer=None, conductor=conductor)
 
 

@@ -271,7 +271,7 @@ class Interface:
         weighted = self.nodes.weight[:, None, None] * blocks
         if self.fixed_conducting is None:
             return weighted
-        there = self.fixed_conducting.nodes
-        jump = there.jump(x)
+        conducting = self.fixed_conducting.nodes
+        jump = conducting.jump(x)
         block = self.fixed_conducting.charge_block(jump, self.fixed_conducting.resting(jump))
-        return np.concatenate([weighted, there.weight[:, None, None] * block])
+        return np.concatenate([weighted, conducting.weight[:, None, None] * block])

@@ -26,25 +26,25 @@ from contact.typing import Array
 
 
 def unit_vectors(vectors: Array) -> Array:
-    """Return the directions of rows, shape (n, d); zero where there is none."""
+    """Return the rows divided by their lengths, shape (n, d); zero rows stay zero."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors / np.where(length > 0, length, 1.0))
 
 
 def contact_directions(
-    normal: Array, movable: Array, given: NDArray[np.bool_] | bool = True
+    normal: Array, movable: Array, prescribed: NDArray[np.bool_] | bool = True
 ) -> tuple[Array, Array]:
     """Return `admissible_normal` and `tangent` of `ContactNodes`, shapes (n, d) and (n, d, d).
 
     The contact directions, (n, d), have an unconstrained part each; `movable` are the projectors
-    onto the unconstrained directions, (n, d, d). `given` says whether supports alone prescribe the
-    jumps along constrained directions, (n,): in front of a foundation they do.
+    onto the unconstrained directions, (n, d, d). `prescribed` says whether supports alone prescribe
+    the jumps along constrained directions, (n,): in front of a foundation they do.
     """
     admissible = np.einsum("nij,nj->ni", movable, normal)
     length = np.linalg.norm(admissible, axis=1)[:, None]
     unit = admissible / length
-    every = (length[:, 0] >= 1 - 1e-12) & given
-    acting = np.where(every[:, None, None], np.eye(normal.shape[1]), movable)
+    all_act = (length[:, 0] >= 1 - 1e-12) & prescribed
+    acting = np.where(all_act[:, None, None], np.eye(normal.shape[1]), movable)
     return unit / length, acting - unit[:, :, None] * unit[:, None, :]
 
 
@@ -146,11 +146,11 @@ class ContactNodes:
         """Add T^T times vectors, (n, d) or (n, block_size), to a local dof array. Collective."""
         size = vectors.shape[1]
         values = self._nodal(into)[:, :size]
-        own = np.ones(self.nodes.size, dtype=bool)
+        uncoupled = np.ones(self.nodes.size, dtype=bool)
         if self.coupling is not None:
-            own[self.coupling.places] = False
+            uncoupled[self.coupling.places] = False
             self.coupling.transpose(vectors[self.coupling.places], values)
-        values[self.nodes[own]] += vectors[own]
+        values[self.nodes[uncoupled]] += vectors[uncoupled]
         if self.motion is not None:
             total = np.einsum("ni,nim->m", vectors, self.motion[:, :size])
             into[into.size - total.size :] -= summed(self.comm, total)
@@ -222,14 +222,14 @@ def joined_nodes(
     nodes on both sides of pairs of bodies, and nodes on a roller if their jump is a sum over nodes.
     """
     _refuse_shared(geometries, parts)
-    pieces = [geometry.nodes for geometry in geometries]
+    groups = [geometry.nodes for geometry in geometries]
     jumps = [geometry.jumps for geometry in geometries if geometry.jumps is not None]
     at_nodes = (
-        np.concatenate([piece.nodes for piece in pieces]),
-        np.concatenate([_unknowns_by_jumps(piece, body) for piece in pieces]),
+        np.concatenate([group.nodes for group in groups]),
+        np.concatenate([_unknowns_by_jumps(group, body) for group in groups]),
     )
     coupling = coupling_operator(body.comm, body.layout.index_map, jumps, at_nodes, body.free)
-    nodes = side_by_side(pieces, coupling)
+    nodes = side_by_side(groups, coupling)
     if coupling is not None and body.layout.inclined is not None:
         _refuse_rollers(nodes, coupling, body.layout.inclined)
     return nodes
@@ -239,8 +239,8 @@ def _unknowns_by_jumps(nodes: ContactNodes, body: BodyEquilibrium) -> Array:
     """Return the nodal unknowns by their jumps, shape (n, block size, block size)."""
     # U = P + nu_a (x) (nu - P nu): u = U j moves in free directions P alone, and u . nu = j . nu.
     inclined, d = body.layout.inclined, nodes.dim
-    there = None if inclined is None else inclined.at(nodes.nodes)
-    unknowns = projectors(body.free[nodes.nodes], there)
+    directions = None if inclined is None else inclined.at(nodes.nodes)
+    unknowns = projectors(body.free[nodes.nodes], directions)
     fixed = nodes.normal - np.einsum("nij,nj->ni", unknowns[:, :d, :d], nodes.normal)
     unknowns[:, :d, :d] += nodes.admissible_normal[:, :, None] * fixed[:, None, :]
     return unknowns
@@ -261,8 +261,8 @@ def motion_at_constant_jump(nodes: ContactNodes, body: BodyEquilibrium) -> Array
 
 def _refuse_shared(geometries: Sequence[Geometry], parts: Sequence[str]) -> None:
     """Refuse contacts that share nodes. Collective."""
-    every = np.concatenate([geometry.nodes.nodes for geometry in geometries])
-    shared = every.size - np.unique(every).size
+    numbers = np.concatenate([geometry.nodes.nodes for geometry in geometries])
+    shared = numbers.size - np.unique(numbers).size
     if geometries[0].nodes.comm.allreduce(shared, op=MPI.SUM) > 0:
         raise InputError(
             f"contact: the parts {', '.join(parts)} share nodes, which one obstacle alone can "
@@ -290,14 +290,14 @@ def _refuse_rollers(nodes: ContactNodes, coupling: CouplingOperator, inclined: I
 
 
 def side_by_side(
-    pieces: Sequence[ContactNodes], coupling: CouplingOperator | None = None
+    groups: Sequence[ContactNodes], coupling: CouplingOperator | None = None
 ) -> ContactNodes:
     """Return the nodes of several contacts as one array, with the operator of their jumps."""
-    first = pieces[0]
+    first = groups[0]
     names = ["nodes", "points", "weight", "normal", "admissible_normal", "tangent", "gap"]
     names += ["deviation"] if first.motion is None else ["deviation", "motion"]
     arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in names
+        name: np.concatenate([getattr(group, name) for group in groups]) for name in names
     }
-    cut = max(piece.cut for piece in pieces)
+    cut = max(group.cut for group in groups)
     return replace(first, cut=cut, coupling=coupling, **arrays)

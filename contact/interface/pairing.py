@@ -56,28 +56,28 @@ class PairPlacement:
         Nodes that face nothing there are open: their gap is infinite.
         """
         slave, master = (side.moved(displacement) for side in (self.slave, self.master))
-        found = couple(slave, master, self.reach, self.no_multiplier, self.nodes)
-        return self.geometry(slave, master, found)
+        coupling = couple(slave, master, self.reach, self.no_multiplier, self.nodes)
+        return self.geometry(slave, master, coupling)
 
-    def geometry(self, slave: Surface, master: Surface, found: Coupling) -> Geometry:
+    def geometry(self, slave: Surface, master: Surface, coupling: Coupling) -> Geometry:
         """Return the geometry, given both sides at their place and their operator. Collective."""
-        body, normal = self.body, found.normal
+        body, normal = self.body, coupling.normal
         _, local = owned_among(body.layout.index_map, self.nodes)
         points = body.space.tabulate_dof_coordinates()[local, : body.dim]
-        gap, cut = found.gap, 0.0
-        if not self.press and found.depth <= TOUCHING * body.domain.size:
-            gap, cut = _without_sagittas(body, found)
+        gap, cut = coupling.gap, 0.0
+        if not self.press and coupling.depth <= TOUCHING * body.domain.size:
+            gap, cut = _without_sagittas(body, coupling)
         unknown = body.comm.allreduce(
             max(side.unknown_deviation for side in (slave, master)), op=MPI.MAX
         )
         movable = body.movable(local)
-        given = _given(body, found, slave.owners, movable)
-        admissible, tangent = contact_directions(normal, movable, given)
+        prescribed = _prescribed(body, coupling, slave.owners, movable)
+        admissible, tangent = contact_directions(normal, movable, prescribed)
         nodes = ContactNodes(
             comm=body.comm,
             nodes=local,
             points=points,
-            weight=found.weight,
+            weight=coupling.weight,
             normal=normal,
             admissible_normal=admissible,
             tangent=tangent,
@@ -88,16 +88,16 @@ class PairPlacement:
             revolved=body.domain.revolved,
             motion=body.global_unknowns.of_foundation(points, body.block_size),
         )
-        return Geometry(nodes, found, found.covered)
+        return Geometry(nodes, coupling, coupling.covered)
 
 
-def _without_sagittas(body: BodyEquilibrium, found: Coupling) -> tuple[Array, float]:
+def _without_sagittas(body: BodyEquilibrium, coupling: Coupling) -> tuple[Array, float]:
     """Return the gaps of sides that touch, and the largest depth that is left out. Collective."""
     # Chords of two curved sides that touch cut each other by their sagittas, which are no overlap:
     # g_j = max(g_j, min(w_j^-1 int Phi_j max(g, 0), 0)), below 0 where Phi_j alone is negative.
-    least = np.minimum(found.gap_positive_part, 0.0)
-    cut = body.comm.allreduce(float(np.max(least - found.gap, initial=0.0)), op=MPI.MAX)
-    return np.maximum(found.gap, least), cut if cut > TOUCHING * body.domain.size else 0.0
+    least = np.minimum(coupling.gap_positive_part, 0.0)
+    cut = body.comm.allreduce(float(np.max(least - coupling.gap, initial=0.0)), op=MPI.MAX)
+    return np.maximum(coupling.gap, least), cut if cut > TOUCHING * body.domain.size else 0.0
 
 
 def find_pair(
@@ -131,16 +131,16 @@ def find_pair(
     _refuse_shared(slave, master, label)
     reach = REACH * body.domain.size
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
-    found = couple(slave, master, reach)
-    beyond, alone = _beyond_rim(slave, found)
+    coupling = couple(slave, master, reach)
+    beyond, alone = _beyond_rim(slave, coupling)
     no_multiplier: NDArray[np.int64] = np.empty(0, dtype=np.int64)
     while True:
-        _, local = owned_among(body.layout.index_map, found.nodes)
+        _, local = owned_among(body.layout.index_map, coupling.nodes)
         points = body.space.tabulate_dof_coordinates()[local, : body.dim]
-        _, added = measured(distance, points, found.normal, body.comm, key)
+        _, added = measured(distance, points, coupling.normal, body.comm, key)
         check_gap(body.domain, added, key)
         least = body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
-        lost = _without_multiplier(body, slave, found, label, part if friction else None)
+        lost = _without_multiplier(body, slave, coupling, label, part if friction else None)
         if press or least < 0:
             lost = np.union1d(lost, beyond)
         new = np.setdiff1d(lost, no_multiplier)
@@ -148,8 +148,8 @@ def find_pair(
             break
         # With the functions of these given to their neighbours, others may face the master.
         no_multiplier = np.union1d(no_multiplier, new)
-        found = couple(slave, master, reach, no_multiplier)
-    if body.comm.allreduce(found.nodes.size, op=MPI.SUM) == 0:
+        coupling = couple(slave, master, reach, no_multiplier)
+    if body.comm.allreduce(coupling.nodes.size, op=MPI.SUM) == 0:
         if max(overlap) > 0:
             raise _overlap(max(overlap), True, False, label)
         raise InputError(
@@ -157,15 +157,17 @@ def find_pair(
             "held there; accepted: sides of two bodies that look at each other",
             "pair",
         )
-    _check_apart(body, found, slave.owners, label)
-    _check_overlap(body, found, (slave, master), added, overlap, press, alone, label)
-    placement = PairPlacement(body, slave, master, reach, no_multiplier, found.nodes, added, press)
-    return placement, placement.geometry(slave, master, found)
+    _check_apart(body, coupling, slave.owners, label)
+    _check_overlap(body, coupling, (slave, master), added, overlap, press, alone, label)
+    placement = PairPlacement(
+        body, slave, master, reach, no_multiplier, coupling.nodes, added, press
+    )
+    return placement, placement.geometry(slave, master, coupling)
 
 
 def _check_overlap(
     body: BodyEquilibrium,
-    found: Coupling,
+    coupling: Coupling,
     sides: tuple[Surface, Surface],
     added: Array,
     overlap: Depths,
@@ -179,17 +181,17 @@ def _check_overlap(
     """
     rounding, owners = TOUCHING * body.domain.size, sides[0].owners
     least = body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
-    depth, resolved = found.interference(owners, added)
+    depth, resolved = coupling.interference(owners, added)
     inside, beside = overlap
     depth = max(depth, max(overlap) - max(least, 0.0))
     # Sides that do not face each other see nothing of an overlap, nor of one beside them.
-    resolved &= inside <= 2 * found.depth and beside - max(least, 0.0) <= rounding
-    coarse = bool((alone & (found.depths > least + rounding)).any())
+    resolved &= inside <= 2 * coupling.depth and beside - max(least, 0.0) <= rounding
+    coarse = bool((alone & (coupling.depths > least + rounding)).any())
     resolved &= not body.comm.allreduce(coarse, op=MPI.LOR)
-    drawn = max(found.depth, *overlap) > rounding
+    drawn = max(coupling.depth, *overlap) > rounding
     if depth <= rounding or (resolved and (press or not drawn)):
         return
-    if drawn and _connected(body, found, owners):
+    if drawn and _connected(body, coupling, owners):
         raise InputError(
             f"{label} are sides of one body that look away from each other; accepted: parts of "
             "two bodies whose meshes are apart",
@@ -244,10 +246,10 @@ def _beyond_rim(slave: Surface, coupling: Coupling) -> tuple[NDArray[np.int64], 
     # Their jump is extrapolated, and closing it would press on the master beyond its rim.
     owners, faces = slave.owners, coupling.faces > FACES
     within = owners.requested(slave.nodes[faces].ravel())
-    known = owners.values(slave.nodes.ravel(), lambda given: np.isin(given, within))
-    known = known.reshape(slave.nodes.shape)
-    partly, beside = ~faces & (coupling.faces > LEAST_COVERED), known.any(axis=1)
-    beyond = owners.requested(slave.nodes[partly & beside][~known[partly & beside]])
+    facing = owners.values(slave.nodes.ravel(), lambda numbers: np.isin(numbers, within))
+    facing = facing.reshape(slave.nodes.shape)
+    partly, beside = ~faces & (coupling.faces > LEAST_COVERED), facing.any(axis=1)
+    beyond = owners.requested(slave.nodes[partly & beside][~facing[partly & beside]])
     return owners.among(beyond, slave.nodes.ravel()), partly & ~beside
 
 
@@ -281,7 +283,7 @@ def _one_sided(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> NDA
     return fixed(coupling.nodes) & (np.abs(coupling.M) @ opposite <= 0)
 
 
-def _given(
+def _prescribed(
     body: BodyEquilibrium, coupling: Coupling, owners: Owners, movable: Array
 ) -> NDArray[np.bool_]:
     """Return where supports constrain the masters along all directions of the slave, (n,)."""
@@ -305,8 +307,8 @@ def _check_rim(
     facets, filled = body.domain.facets(part), False
     for support in body.description.fixed:
         supported = np.isin(facets, body.domain.facets_anywhere(support.on))
-        for given, nodes in zip(support.displacement or (), lost, strict=False):
-            if given is not None:
+        for component, nodes in zip(support.displacement or (), lost, strict=False):
+            if component is not None:
                 filled |= bool((supported & np.isin(slave.nodes, nodes).all(axis=1)).any())
     if body.comm.allreduce(filled, op=MPI.LOR):
         raise InputError(
@@ -342,9 +344,9 @@ def _overlap(
 
 def _connected(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> bool:
     """Return whether both sides are on one connected component. Collective."""
-    piece, count = body.components
-    found = np.zeros((2, count), dtype=np.intc)
+    component, count = body.components
+    touched = np.zeros((2, count), dtype=np.intc)
     for k, nodes in enumerate((coupling.slaves, coupling.masters)):
-        found[k, piece[owners.requested(nodes) - owners.begin]] = 1
-    body.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
-    return bool(found.all(axis=0).any())
+        touched[k, component[owners.requested(nodes) - owners.begin]] = 1
+    body.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
+    return bool(touched.all(axis=0).any())

@@ -72,7 +72,7 @@ class Candidates:
             return np.asarray(np.einsum("nd,nd->n", self.direction, jumps))
 
 
-def candidates(
+def find_candidates(
     body: BodyEquilibrium, facets: Surface, obstacle: Obstacle, displacement: Array, key: str
 ) -> Candidates:
     """Return the nodes of a part at a place, and the obstacle as they see it. Collective.
@@ -88,10 +88,10 @@ def candidates(
     _, nodes = owned_among(body.space.dofmap.index_map, lumped.nodes)
     points = body.space.tabulate_dof_coordinates()[nodes, : body.dim] + displacement[nodes]
     normal = lumped.normal / np.linalg.norm(lumped.normal, axis=1)[:, None]
-    known = np.einsum("nd,nd->n", lumped.deviation, normal)
-    chord_penetration = np.maximum(known, known - lumped.least)
+    deviation = np.einsum("nd,nd->n", lumped.deviation, normal)
+    chord_penetration = np.maximum(deviation, deviation - lumped.least)
     if facets.refined and facets.order == 1:
-        # The last edges of a part are halves of one chord, which tell nothing of the curve.
+        # The last edges of a refined part are halves of one chord: their deviation is unknown.
         most = comm.allreduce(float(chord_penetration.max(initial=0.0)), op=MPI.MAX)
         chord_penetration = np.full_like(chord_penetration, most)
     front = points + lumped.deviation if obstacle.is_shape else points
@@ -114,7 +114,7 @@ def candidates(
         places=points,
         facing=np.einsum("ni,ni->n", direction, normal),
         front=front,
-        # The direction may be a little aside.
+        # The contact direction may differ a little from the normal.
         chord_penetration=ROUNDED * body.domain.size + 1.1 * chord_penetration,
         direction=direction,
         measured=gap,
@@ -135,12 +135,12 @@ def _from_curve(
         return gap, np.full_like(gap, unknown)
     corners = facets.nodes[:, : facets.shape.corners]
     values = facets.owners.values(
-        corners.ravel(), lambda given: gap[np.searchsorted(numbers, given)]
+        corners.ravel(), lambda asked: gap[np.searchsorted(numbers, asked)]
     )
-    own, found = facets.reconstructed(values.reshape(corners.shape))
-    told, weight, rest = found[np.searchsorted(own, numbers)].T
+    nodes, curve = facets.reconstructed(values.reshape(corners.shape))
+    curve_gap, weight, unknown_part = curve[np.searchsorted(nodes, numbers)].T
     with np.errstate(invalid="ignore"):
-        return np.where(weight > 0, (1 - weight) * gap + weight * told, gap), rest
+        return np.where(weight > 0, (1 - weight) * gap + weight * curve_gap, gap), unknown_part
 
 
 @dataclass(frozen=True)
@@ -169,15 +169,17 @@ class FoundationPlacement:
         Nodes that see no foundation there are open: their gap is infinite.
         """
         facets = self.facets.moved(displacement)
-        return self.geometry(candidates(self.body, facets, self.obstacle, displacement, self.key))
+        return self.geometry(
+            find_candidates(self.body, facets, self.obstacle, displacement, self.key)
+        )
 
-    def geometry(self, found: Candidates) -> Geometry:
+    def geometry(self, candidates: Candidates) -> Geometry:
         """Return the geometry, given all nodes of the part at their place. Collective."""
-        body, of = self.body, found.nodes[self.contact]
+        body, of = self.body, candidates.nodes[self.contact]
         points = body.space.tabulate_dof_coordinates()[of, : body.dim]
-        direction, gap, cut = found.direction[self.contact], found.gap, 0.0
+        direction, gap, cut = candidates.direction[self.contact], candidates.gap, 0.0
         if self.obstacle.is_shape and not self.press:
-            chord = (found.facing > 0) & (gap < 0) & (-gap <= found.chord_penetration)
+            chord = (candidates.facing > 0) & (gap < 0) & (-gap <= candidates.chord_penetration)
             cut = body.comm.allreduce(float(np.max(-gap[chord], initial=0.0)), op=MPI.MAX)
             gap = np.where(chord, 0.0, gap)
         admissible, tangent = contact_directions(direction, body.movable(of))
@@ -185,35 +187,36 @@ class FoundationPlacement:
             comm=body.comm,
             nodes=of,
             points=points,
-            weight=found.weight[self.contact],
+            weight=candidates.weight[self.contact],
             normal=direction,
             admissible_normal=admissible,
             tangent=tangent,
-            gap=found.of_jumps(gap)[self.contact],
-            deviation=found.unknown[self.contact],
+            gap=candidates.of_jumps(gap)[self.contact],
+            deviation=candidates.unknown[self.contact],
             block_size=body.block_size,
             cut=cut if cut > ROUNDED * body.domain.size else 0.0,
             revolved=body.domain.revolved,
             motion=body.global_unknowns.of_foundation(
-                found.places[self.contact], body.block_size, self.part
+                candidates.places[self.contact], body.block_size, self.part
             ),
         )
         if self.fixed_conducting is None:
-            return Geometry(nodes, found.jumps)
-        own, there = self.fixed_conducting, found.nodes[self.fixed_conducting]
+            return Geometry(nodes, candidates.jumps)
+        conducting = self.fixed_conducting
+        conducting_nodes = candidates.nodes[conducting]
         fixed_conducting = replace(
             nodes,
-            nodes=there,
-            points=body.space.tabulate_dof_coordinates()[there, : body.dim],
-            weight=found.weight[own],
-            normal=found.direction[own],
-            admissible_normal=found.direction[own],
-            tangent=np.zeros((there.size, body.dim, body.dim)),
-            gap=found.of_jumps(found.gap)[own],
-            deviation=found.unknown[own],
+            nodes=conducting_nodes,
+            points=body.space.tabulate_dof_coordinates()[conducting_nodes, : body.dim],
+            weight=candidates.weight[conducting],
+            normal=candidates.direction[conducting],
+            admissible_normal=candidates.direction[conducting],
+            tangent=np.zeros((conducting_nodes.size, body.dim, body.dim)),
+            gap=candidates.of_jumps(candidates.gap)[conducting],
+            deviation=candidates.unknown[conducting],
             motion=None,
         )
-        return Geometry(nodes, found.jumps, fixed_conducting=fixed_conducting)
+        return Geometry(nodes, candidates.jumps, fixed_conducting=fixed_conducting)
 
 
 def find_nodes(
@@ -241,30 +244,30 @@ def find_nodes(
     behind the contact part, or cut the body in the reference configuration.
     """
     comm, facets = body.comm, surface_of(body.domain, body.space, part)
-    rest = np.zeros((body.layout.index_map.size_local, body.dim))
-    found = candidates(body, facets, obstacle, rest, key)
+    zero = np.zeros((body.layout.index_map.size_local, body.dim))
+    candidates = find_candidates(body, facets, obstacle, zero, key)
     if obstacle.is_shape:
         try:
-            _refuse_behind(body, obstacle, facets, found)
-            _refuse_within(body.domain, obstacle, found)
+            _refuse_behind(body, obstacle, facets, candidates)
+            _refuse_within(body.domain, obstacle, candidates)
             if not press:  # an adaptive run starts on facets that hide the shape
-                _refuse_overlap(body, found)
+                _refuse_overlap(body, candidates)
                 _refuse_unresolved(body.domain, obstacle, facets)
         except InputError as error:
             raise error.within(f"{key}.") from None
     else:
-        check_gap(body.domain, found.gap, key)
-    movable = body.movable(found.nodes)
-    free = np.linalg.norm(np.einsum("nij,nj->ni", movable, found.direction), axis=1) > APART
+        check_gap(body.domain, candidates.gap, key)
+    movable = body.movable(candidates.nodes)
+    free = np.linalg.norm(np.einsum("nij,nj->ni", movable, candidates.direction), axis=1) > APART
     # A gap is infinite where the contact direction does not lead to the foundation.
-    meets = np.isfinite(found.of_jumps(found.gap))
+    meets = np.isfinite(candidates.of_jumps(candidates.gap))
     if not comm.allreduce(bool(meets.any()), op=MPI.LOR):
         raise InputError(
             f"{key}: from no node of the part {part!r} does the contact direction meet the "
             "foundation; accepted: a shape in front of the part; an axis from the body towards it",
             "foundation-missed",
         )
-    bears, acts = found.weight > 0, free & meets
+    bears, acts = candidates.weight > 0, free & meets
     chosen = acts & bears
     if not comm.allreduce(bool(chosen.any()), op=MPI.LOR):
         if comm.allreduce(bool(acts.any()), op=MPI.LOR):
@@ -279,12 +282,12 @@ def find_nodes(
         )
     fixed_conducting = None
     if conducts:
-        fixed_conducting = ~chosen & body.free[found.nodes, -1] & meets & bears
-        _check_charged(body, part, found.nodes, fixed_conducting, key)
+        fixed_conducting = ~chosen & body.free[candidates.nodes, -1] & meets & bears
+        _check_charged(body, part, candidates.nodes, fixed_conducting, key)
     placement = FoundationPlacement(
         body, part, facets, obstacle, key, press, chosen, fixed_conducting
     )
-    return placement, placement.geometry(found)
+    return placement, placement.geometry(candidates)
 
 
 def _check_charged(
@@ -302,8 +305,8 @@ def _check_charged(
             "electrode of unknown potential; accepted: parts apart, or an insulated foundation",
             "rigid-part",
         )
-    some = body.comm.allreduce(bool(fixed_conducting.any()), op=MPI.LOR)
-    if some and body.global_unknowns.member(part) is not None:
+    any_charged = body.comm.allreduce(bool(fixed_conducting.any()), op=MPI.LOR)
+    if any_charged and body.global_unknowns.member(part) is not None:
         raise InputError(
             f"{key}.rigid: supports hold nodes of part {part!r}, which carry charge as "
             "the foundation comes near; accepted: a part that can move everywhere",
@@ -312,12 +315,12 @@ def _check_charged(
 
 
 def _refuse_behind(
-    body: BodyEquilibrium, obstacle: Obstacle, facets: Surface, found: Candidates
+    body: BodyEquilibrium, obstacle: Obstacle, facets: Surface, candidates: Candidates
 ) -> None:
     """Refuse a foundation behind the contact part; all of a disc may be one. Collective."""
     # Where no ray meets the foundation the gap is infinite, and `find_nodes` has its message.
-    seen = np.isfinite(found.measured)
-    best = body.comm.allreduce(np.max(found.facing[seen], initial=-np.inf), op=MPI.MAX)
+    seen = np.isfinite(candidates.measured)
+    best = body.comm.allreduce(np.max(candidates.facing[seen], initial=-np.inf), op=MPI.MAX)
     if np.isfinite(best) and best <= 1e-9:
         # Nodes beside a punch that is within facets see it sideways.
         _refuse_unresolved(body.domain, obstacle, facets, facing=False)
@@ -329,15 +332,15 @@ def _refuse_behind(
         )
 
 
-def _refuse_within(domain: Domain, obstacle: Obstacle, found: Candidates) -> None:
+def _refuse_within(domain: Domain, obstacle: Obstacle, candidates: Candidates) -> None:
     """Refuse nodes in a shape from which the contact direction leads on through it. Collective."""
     # It meets a far side, or nothing, and nodes that touch would seem to be open.
     if not isinstance(obstacle, Shape):
         return
-    rounding, facing = ROUNDED * domain.size, found.facing > 0
+    rounding, facing = ROUNDED * domain.size, candidates.facing > 0
     with on_all_ranks(domain.comm), naming("foundation"):
-        within = obstacle.distance(found.front[facing])[0] < -rounding
-        within &= found.measured[facing] > rounding
+        within = obstacle.distance(candidates.front[facing])[0] < -rounding
+        within &= candidates.measured[facing] > rounding
     count = domain.comm.allreduce(np.count_nonzero(within))
     if count > 0:
         raise InputError(
@@ -349,12 +352,12 @@ def _refuse_within(domain: Domain, obstacle: Obstacle, found: Candidates) -> Non
         )
 
 
-def _refuse_overlap(body: BodyEquilibrium, found: Candidates) -> None:
+def _refuse_overlap(body: BodyEquilibrium, candidates: Candidates) -> None:
     """Refuse nodes in a shape by more than facets deviate from a curve. Collective."""
     # Nodes on straight facets of a curved part may lie in a ball that the facets' corners touch.
-    depth = np.where(found.facing > 0, -found.gap, 0.0)
+    depth = np.where(candidates.facing > 0, -candidates.gap, 0.0)
     cut = body.comm.allreduce(np.max(depth, initial=0.0), op=MPI.MAX)
-    if body.comm.allreduce(bool(np.any(depth > found.chord_penetration)), op=MPI.LOR):
+    if body.comm.allreduce(bool(np.any(depth > candidates.chord_penetration)), op=MPI.LOR):
         raise InputError(
             f"foundation: the undeformed body cuts it, by up to {cut:.3g}; accepted: gaps "
             f">= 0 but for {ROUNDED * body.domain.size:.1g} (rounding), and the deviation of "
@@ -378,10 +381,10 @@ def _refuse_unresolved(
         near = np.flatnonzero(obstacle.distance(facets.centres)[0] < 2 * facets.radii)
         x = (shape.lagrange(facets.order, at) @ facets.points[near]).reshape(-1, domain.dim)
         distance, outward = obstacle.distance(x)
-    every, there = np.repeat(near, len(at)), np.tile(at, (near.size, 1))
-    normal = facets.normal[every]
+    facet, reference = np.repeat(near, len(at)), np.tile(at, (near.size, 1))
+    normal = facets.normal[facet]
     # No overlap where the facets, or the surfaces that they approximate, have none.
-    behind = np.minimum(facets.distance_bounds(every, there, normal)[0], 0.0)
+    behind = np.minimum(facets.distance_bounds(facet, reference, normal)[0], 0.0)
     faces = (np.einsum("pd,pd->p", normal, outward) < 0) | (not facing)
     depths = np.where(faces, -distance + 1.1 * behind, 0.0).reshape(near.size, len(at))
     nodes = depths[:, : len(shape.nodes(facets.degree))].max(axis=1)

@@ -120,20 +120,20 @@ class Parts:
 def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> Parts:
     """Integrate the dual functions of slave facets, alone and with the facets opposite."""
     master = opposite.master
-    direction, found = _facing(slave, opposite)
+    direction, quadrature = _facing(slave, opposite)
     change = dual_basis_transformation(slave.shape, slave.degree)
-    dual, weight = _dual(slave, found, change)
+    dual, weight = _dual(slave, quadrature, change)
     dual, facet_mass = basis.functions @ dual, basis.functions * weight[:, None, :]
     whole = np.einsum("fij,fj->fi", basis.functions, integrals(slave))
     gap, normal = np.zeros((*weight.shape, 3)), np.zeros((*weight.shape, direction.shape[1]))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
-    for points in found:
-        own_share = points.weight[:, None] * _functions(points, slave, change)
-        phi = np.einsum("pij,pj->pi", dual[points.slave], own_share)
+    for points in quadrature:
+        shares = points.weight[:, None] * _functions(points, slave, change)
+        phi = np.einsum("pij,pj->pi", dual[points.slave], shares)
         across = np.column_stack([points.gap, np.maximum(points.gap, 0.0), points.curved_gap])
         _add(gap, points.slave, phi[:, :, None] * across[:, None, :])
         normals = _normals(points, slave, master, direction)
-        _add(normal, points.slave, own_share[:, :, None] * normals[:, None, :])
+        _add(normal, points.slave, shares[:, :, None] * normals[:, None, :])
         entries.append(_master_entries(points, phi, basis.nodes, master))
     rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
     return Parts(
@@ -147,19 +147,19 @@ def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> P
         rows=rows,
         columns=columns,
         values=values,
-        depths=np.max([np.full(slave.count, -np.inf), *(p.depth for p in found)], axis=0),
+        depths=np.max([np.full(slave.count, -np.inf), *(p.depth for p in quadrature)], axis=0),
     )
 
 
 def _facing(slave: Surface, opposite: Opposite) -> tuple[Array, list[Points]]:
     """Return the directions along which facets look, (f, d), and the points where they meet."""
     master, pairs, direction = opposite.master, list(opposite.pairs(slave)), slave.normal
-    found = [common_points(slave, master, pair, direction) for pair in pairs]
-    middle = _middle(slave, master, found)
+    quadrature = [common_points(slave, master, pair, direction) for pair in pairs]
+    middle = _middle(slave, master, quadrature)
     if np.abs(middle - direction).max(initial=0.0) > ROUNDING:
         direction = middle
-        found = [common_points(slave, master, pair, direction) for pair in pairs]
-    return direction, found
+        quadrature = [common_points(slave, master, pair, direction) for pair in pairs]
+    return direction, quadrature
 
 
 def _functions(points: Points, slave: Surface, change: Array) -> Array:
@@ -169,20 +169,20 @@ def _functions(points: Points, slave: Surface, change: Array) -> Array:
 
 def _normals(points: Points, slave: Surface, master: Surface, direction: Array) -> Array:
     """Return unit vectors at points between the normals of both sides, shape (p, d)."""
-    # On straight facets the directions of these, for their own jump at edges.
+    # Straight facets keep their directions, since their normals jump at edges.
     if slave.order == 1:
         return direction[points.slave]
     i, j = points.slave, points.master
-    both = slave.normals(i, slave.slopes(i, points.on_slave))
-    both -= master.normals(j, master.slopes(j, points.on_master))
-    return np.asarray(both / np.linalg.norm(both, axis=1)[:, None])
+    normals = slave.normals(i, slave.slopes(i, points.on_slave))
+    normals -= master.normals(j, master.slopes(j, points.on_master))
+    return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
 
 
-def _dual(slave: Surface, found: Sequence[Points], change: Array) -> tuple[Array, Array]:
+def _dual(slave: Surface, quadrature: Sequence[Points], change: Array) -> tuple[Array, Array]:
     """Return C of the dual functions Phi = C N~, (f, k, k), and int N~ where they face, (f, k)."""
     k = change.shape[0]
     mass, weight = np.zeros((slave.count, k, k)), np.zeros((slave.count, k))
-    for points in found:
+    for points in quadrature:
         n = _functions(points, slave, change)
         _add(mass, points.slave, points.weight[:, None, None] * n[:, :, None] * n[:, None, :])
         _add(weight, points.slave, points.weight[:, None] * n)
@@ -192,12 +192,12 @@ def _dual(slave: Surface, found: Sequence[Points], change: Array) -> tuple[Array
     return dual, np.where(faces[:, None], weight, 0.0)
 
 
-def _middle(slave: Surface, master: Surface, found: Sequence[Points]) -> Array:
+def _middle(slave: Surface, master: Surface, quadrature: Sequence[Points]) -> Array:
     """Return directions between the normals of slave facets and of those opposite, shape (f, d)."""
-    # Two curved sides see each other alike along them; the normals of one side alone would turn
-    # some of the closing of the gap into slip.
+    # Along them both curved sides have the same gaps; the normals of one side alone would turn some
+    # of the closing of the gap into slip.
     total = np.zeros_like(slave.normal)
-    for points in found:
+    for points in quadrature:
         _add(total, points.slave, points.weight[:, None] * master.normal[points.master])
     length = np.linalg.norm(total, axis=1)
     mean = total / np.where(length > 0, length, 1.0)[:, None]
@@ -231,10 +231,10 @@ def _master_entries(
     return rows.ravel(), columns.ravel(), values.ravel()
 
 
-#: Nodes less than this share of whose function faces the master carry no multiplier.
+#: Share of a node's function that faces the master, below which the node has no multiplier.
 LEAST_COVERED = 1e-3
 
-#: Share of an overlap that gaps at nodes have at least, if facets are short enough for it.
+#: Least share of an overlap in the gaps at nodes, where facets are short enough to resolve it.
 RESOLVED = 0.5
 
 
@@ -292,16 +292,16 @@ class Coupling(JumpRows):
 
         def at(numbers: NDArray[np.int64]) -> Array:
             """Return the gaps added at nodes of this rank, the least where there are none."""
-            found = np.full(numbers.size, least)
-            there = np.isin(numbers, self.nodes)
-            found[there] = added[np.searchsorted(self.nodes, numbers[there])]
-            return found
+            gaps = np.full(numbers.size, least)
+            with_gap = np.isin(numbers, self.nodes)
+            gaps[with_gap] = added[np.searchsorted(self.nodes, numbers[with_gap])]
+            return gaps
 
         on_facets = owners.values(self.dual_nodes.ravel(), at).reshape(self.dual_nodes.shape)
         depths = self.depths - on_facets.max(axis=1)
         depth = comm.allreduce(float(depths.max(initial=0.0)), op=MPI.MAX)
-        # A corner within a long facet leaves the mean gaps at the nodes of that above 0.
-        # That of a node beyond the corner, on a facet covered in part, is extrapolated.
+        # A corner that cuts a long facet between its nodes leaves their mean gaps above 0. The gap
+        # of a node beyond the corner, on a partly covered facet, is extrapolated.
         gap = self.curved_gap + added
         within = (gap < -RESOLVED * depth) & (gap > -2 * depth)
         pressed = owners.among(self.nodes[within], self.dual_nodes.ravel())
@@ -346,17 +346,17 @@ def _assembled(
         *(parts.facet_mass.sum(axis=2), parts.whole, around),
         *(parts.normal, parts.open_normal, parts.gap),
     )
-    every, total = owners.sums(
+    numbers, total = owners.sums(
         parts.dual_nodes.ravel(),
         np.hstack([part.reshape(f * k, int(np.prod(part.shape[2:]))) for part in shares]),
     )
     areas, *vectors = np.split(total, 3 + d * np.arange(5), axis=1)
     weight, whole, around = areas.T
-    some = whole > NEGLIGIBLE * around
-    covered = np.where(some, weight / np.where(some, whole, 1.0), 0.0)
+    has_area = whole > NEGLIGIBLE * around
+    covered = np.where(has_area, weight / np.where(has_area, whole, 1.0), 0.0)
     if nodes is None:
-        nodes = every[(covered > LEAST_COVERED) & ~np.isin(every, no_multiplier)]
-    kept = np.searchsorted(every, nodes)
+        nodes = numbers[(covered > LEAST_COVERED) & ~np.isin(numbers, no_multiplier)]
+    kept = np.searchsorted(numbers, nodes)
     faces = covered[kept] > LEAST_COVERED
     weight = np.where(faces, weight[kept], whole[kept])
     normal, outward, *gaps = (vector[kept] for vector in vectors)
@@ -365,20 +365,25 @@ def _assembled(
     gap, positive_part, curved_gap = (
         np.where(faces, np.einsum("nd,nd->n", vector, normal) / weight, np.inf) for vector in gaps
     )
-    # Each facet with a node has all of the node's row of D. The jump of an open node is its u.
+    # Each facet with a node has all of the node's row of D. The jump of an open node is its
+    # displacement.
     opened = nodes[~faces]
 
     def of_facing(entries: Entries) -> Entries:
-        there = ~np.isin(entries[0], opened)
-        return entries[0][there], entries[1][there], entries[2][there]
+        facing = ~np.isin(entries[0], opened)
+        return entries[0][facing], entries[1][facing], entries[2][facing]
 
     rows, columns = np.broadcast_arrays(parts.dual_nodes[:, :, None], parts.nodes[:, None, :])
     values = (parts.facet_mass @ back).ravel()
     row, column, value = of_facing(owners.entries(rows.ravel(), columns.ravel(), values))
-    own = np.append(row, opened), np.append(column, opened), np.append(value, weight[~faces])
-    slaves, D = sparse_rows(nodes, own)
-    entries = of_facing(owners.entries(parts.rows, parts.columns, parts.values))
-    masters, M = sparse_rows(nodes, entries)
+    slave_entries = (
+        np.append(row, opened),
+        np.append(column, opened),
+        np.append(value, weight[~faces]),
+    )
+    slaves, D = sparse_rows(nodes, slave_entries)
+    master_entries = of_facing(owners.entries(parts.rows, parts.columns, parts.values))
+    masters, M = sparse_rows(nodes, master_entries)
     divide = sparse.diags_array(1 / weight)
     jumps = nodes, slaves, sparse.csr_array(divide @ D), masters, sparse.csr_array(divide @ M)
     depth = owners.comm.allreduce(float(parts.depths.max(initial=0.0)), op=MPI.MAX)

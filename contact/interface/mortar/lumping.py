@@ -79,9 +79,11 @@ class JumpRows:
 
         Jumps made of infinite values are NaN.
         """
-        there = owners.values(self.slaves, lambda given: values[np.searchsorted(self.nodes, given)])
+        slave_values = owners.values(
+            self.slaves, lambda numbers: values[np.searchsorted(self.nodes, numbers)]
+        )
         with np.errstate(invalid="ignore"):
-            return np.asarray(self.D @ there)
+            return np.asarray(self.D @ slave_values)
 
     def on_coefficients(self, owners: Owners, forces: Array) -> Array:
         """Return the forces D^-T f on coefficients D u, given those on u, (n, m). Collective.
@@ -91,12 +93,12 @@ class JumpRows:
         """
         at = np.searchsorted(self.slaves, self.nodes)
         diagonal = self.D.data[self.D.indices == np.repeat(at, np.diff(self.D.indptr))]
-        found = forces / diagonal[:, None]
-        others = -(self.D.T @ found)
+        dual_forces = forces / diagonal[:, None]
+        others = -(self.D.T @ dual_forces)
         others[at] += forces
         nodes, sums = owners.sums(self.slaves, others)
-        found[np.searchsorted(self.nodes, nodes)] += sums
-        return np.asarray(found)
+        dual_forces[np.searchsorted(self.nodes, nodes)] += sums
+        return np.asarray(dual_forces)
 
 
 @dataclass(frozen=True)
@@ -138,11 +140,11 @@ class Lumping:
             shares = measure.sum(axis=1)[:, None, None] * np.eye(len(places))
         slopes = jacobians(surface.shape, surface.points, places)
         normals = surface.normals(np.arange(surface.count)[:, None], slopes)
-        known, least = np.moveaxis(surface.node_heights, 2, 0)
+        height, least = np.moveaxis(surface.node_heights, 2, 0)
         parts = [
             areas.reshape(count, 1),
             np.einsum("fqd,fqk->fkd", normals, shares).reshape(count, d),
-            (known[..., None] * surface.normal[:, None, :]).reshape(count, d),
+            (height[..., None] * surface.normal[:, None, :]).reshape(count, d),
             least.reshape(count, 1),
             np.ones((count, 1)),
         ]
@@ -153,10 +155,10 @@ class Lumping:
         deviation, least = deviation / often, (least / often)[:, 0]
         change, jumps = dual_basis_transformation(surface.shape, surface.degree), None
         if not np.array_equal(change, np.eye(len(change))):
-            both = np.broadcast_arrays(surface.nodes[:, :, None], surface.nodes[:, None, :])
-            values = np.broadcast_to(np.linalg.inv(change.T), both[0].shape)
-            entries = owners.entries(*(part.ravel() for part in (*both, values)))
-            # Facets that share nodes say the same of them: any of them may be heard.
+            node_pairs = np.broadcast_arrays(surface.nodes[:, :, None], surface.nodes[:, None, :])
+            values = np.broadcast_to(np.linalg.inv(change.T), node_pairs[0].shape)
+            entries = owners.entries(*(part.ravel() for part in (*node_pairs, values)))
+            # Facets that share nodes have equal entries there: the first ones are taken.
             _, first = np.unique(np.column_stack(entries[:2]), axis=0, return_index=True)
             row, column, value = entries[0][first], entries[1][first], entries[2][first]
             jumps = JumpRows.one_sided(nodes, *sparse_rows(nodes, (row, column, value)))
@@ -169,17 +171,17 @@ class Lumping:
         as others. As at crosspoints its function goes to its neighbour.
         """
         owners, nodes = surface.owners, self.nodes
-        # A part has two ends in the half plane.
+        # Few pairs: a part has two ends in the half plane.
         pairs = np.concatenate(owners.comm.allgather(pairs_at_axis(surface, surface.nodes)))
         if len(pairs) == 0:
             return self
         weights = owners.values(
-            pairs.ravel(), lambda given: self.weight[np.searchsorted(nodes, given)]
+            pairs.ravel(), lambda asked: self.weight[np.searchsorted(nodes, asked)]
         ).reshape(pairs.shape)
         (axis, beside), total, weight = pairs.T, weights.sum(axis=1), self.weight.copy()
         for numbers, values in ((axis, np.zeros(axis.size)), (beside, total)):
-            here = np.isin(numbers, nodes)
-            weight[np.searchsorted(nodes, numbers[here])] = values[here]
+            owned = np.isin(numbers, nodes)
+            weight[np.searchsorted(nodes, numbers[owned])] = values[owned]
         alone = np.setdiff1d(nodes, beside)
         entries = (
             np.concatenate([alone, beside, beside]),

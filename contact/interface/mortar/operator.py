@@ -35,33 +35,33 @@ class CouplingOperator:
     between: bool  #: whether there are masters
     local: NDArray[np.intp]  #: local numbers of the nodes in jumps of any rank, shape (h,)
     places: NDArray[np.intp]  #: positions of nodes of `jumps` among given nodes, (k,)
-    own: NDArray[np.intp]  #: rows of `jumps` at `places`, shape (k,)
+    rows: NDArray[np.intp]  #: rows of `jumps` at `places`, shape (k,)
 
     def at(self, numbers: NDArray[np.int64]) -> CouplingOperator:
         """Return the operator at other nodes of this rank, given their global numbers."""
         order = np.argsort(self.numbers)
-        found = np.searchsorted(self.numbers, numbers, sorter=order)
+        positions = np.searchsorted(self.numbers, numbers, sorter=order)
         places = np.flatnonzero(np.isin(numbers, self.numbers))
-        return replace(self, places=places, own=order[found[places]])
+        return replace(self, places=places, rows=order[positions[places]])
 
     @cached_property
-    def _here(self) -> sparse.csr_array:
+    def _rows_at_places(self) -> sparse.csr_array:
         """Rows at `places`."""
-        return self.jumps[self.own]
+        return self.jumps[self.rows]
 
     def apply(self, x: Array) -> Array:
         """Return the jumps at `places` of local unknowns, (nodes, block size). Collective."""
-        return np.asarray(self._here @ self.halo.forward(x[: self.halo.count]))
+        return np.asarray(self._rows_at_places @ self.halo.forward(x[: self.halo.count]))
 
     def transpose(self, vectors: Array, into: Array) -> None:
         """Add the transpose of vectors at `places` to owned nodes, (nodes, k). Collective."""
-        into[: self.halo.count] += self.halo.reverse(np.asarray(self._here.T @ vectors))
+        into[: self.halo.count] += self.halo.reverse(np.asarray(self._rows_at_places.T @ vectors))
 
 
 def coupling_operator(
     comm: MPI.Intracomm,
     index_map: IndexMap,
-    given: Sequence[JumpRows],
+    jump_rows: Sequence[JumpRows],
     nodes: tuple[NDArray[np.int32], Array],
     free: NDArray[np.bool_],
 ) -> CouplingOperator | None:
@@ -72,18 +72,18 @@ def coupling_operator(
     is the mask of the unfixed unknowns of owned nodes, shape (nodes, block size). Refuses nodes of
     several contacts that follow each other in a circle.
     """
-    if not given:
+    if not jump_rows:
         return None
     owners = Owners.of(index_map, comm)
-    columns = [np.concatenate([rows.slaves, rows.masters]) for rows in given]
+    columns = [np.concatenate([rows.slaves, rows.masters]) for rows in jump_rows]
     halo = Halo(owners, index_map.size_local, np.concatenate(columns))
-    numbers = np.concatenate([rows.nodes for rows in given])
-    found = []  # each contact's jumps by the values of the nodes of all contacts
-    for rows, names in zip(given, columns, strict=True):
-        own = sparse.hstack([rows.D, -rows.M], format="coo")
-        at, shape = (own.row, halo.places(names)[own.col]), (rows.nodes.size, halo.numbers.size)
-        found.append(sparse.csr_array((own.data, at), shape=shape))
-    jumps = sparse.vstack(found, format="csr")
+    numbers = np.concatenate([rows.nodes for rows in jump_rows])
+    blocks = []  # each contact's jumps by the values of the nodes of all contacts
+    for rows, names in zip(jump_rows, columns, strict=True):
+        block = sparse.hstack([rows.D, -rows.M], format="coo")
+        at, shape = (block.row, halo.places(names)[block.col]), (rows.nodes.size, halo.numbers.size)
+        blocks.append(sparse.csr_array((block.data, at), shape=shape))
+    jumps = sparse.vstack(blocks, format="csr")
     replaced = halo.places(numbers)
     circle = _cyclic(comm, halo, replaced, jumps)
     if circle:
@@ -97,13 +97,13 @@ def coupling_operator(
     taking[jumps.indices] = 1.0
     local, unknowns = nodes
     named = index_map.local_to_global(local)
-    order, every = np.argsort(named), np.eye(free.shape[1]) * free[replaced][:, None, :]
+    order, by_jumps = np.argsort(named), np.eye(free.shape[1]) * free[replaced][:, None, :]
     of_contact = np.isin(numbers, named)
     place = np.searchsorted(named, numbers[of_contact], sorter=order)
-    every[of_contact] = unknowns[order[place]]
-    change = BasisChange.of(comm, halo, replaced, jumps, (every, free))
+    by_jumps[of_contact] = unknowns[order[place]]
+    change = BasisChange.of(comm, halo, replaced, jumps, (by_jumps, free))
     none = np.zeros(0, dtype=np.intp)
-    between = comm.allreduce(any(rows.masters.size for rows in given), op=MPI.LOR)
+    between = comm.allreduce(any(rows.masters.size for rows in jump_rows), op=MPI.LOR)
     taken = np.flatnonzero(halo.reverse(taking)[:, 0])
     operator = CouplingOperator(
         halo=halo,
@@ -113,7 +113,7 @@ def coupling_operator(
         between=between,
         local=taken,
         places=none,
-        own=none,
+        rows=none,
     )
     return operator.at(named)
 
@@ -122,25 +122,25 @@ def _cyclic(
     comm: MPI.Intracomm, halo: Halo, replaced: NDArray[np.intp], jumps: sparse.csr_array
 ) -> int:
     """Return the number of replaced nodes in circles of nodes following each other. Collective."""
-    # Take away nodes that follow none that is left, then those that none follows.
+    # Remove nodes that follow no remaining node, then those that no remaining node follows.
     follows = sparse.coo_array(jumps)
     others = (replaced[follows.row] != follows.col) & (follows.data != 0)
     follows = sparse.csr_array(
         (np.ones(np.count_nonzero(others)), (follows.row[others], follows.col[others])),
         shape=jumps.shape,
     )
-    left: Array = np.ones((replaced.size, 1))
+    remaining: Array = np.ones((replaced.size, 1))
     total = comm.allreduce(replaced.size, op=MPI.SUM)
     for leading in (False, True):
         while total:
             if leading:
-                met = halo.reverse(follows.T @ left)[replaced]
+                met = halo.reverse(follows.T @ remaining)[replaced]
             else:
-                every = np.zeros((halo.count, 1))
-                every[replaced] = left
-                met = follows @ halo.forward(every)
-            left = left * (met > 0)
-            before, total = total, comm.allreduce(int(left.sum()), op=MPI.SUM)
+                in_halo = np.zeros((halo.count, 1))
+                in_halo[replaced] = remaining
+                met = follows @ halo.forward(in_halo)
+            remaining = remaining * (met > 0)
+            before, total = total, comm.allreduce(int(remaining.sum()), op=MPI.SUM)
             if total == before:
                 break
     return int(total)

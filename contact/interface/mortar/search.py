@@ -38,7 +38,7 @@ class Opposite:
 
     @staticmethod
     def of(slave: Surface, master: Surface, reach: float) -> Opposite:
-        """Find them, given the facets of this rank. Collective."""
+        """Find the master facets in reach of the slave facets of this rank. Collective."""
         comm = slave.owners.comm
         widest = comm.allreduce(float(master.radii.max(initial=0.0)), op=MPI.MAX)
         distance = nearest(comm, slave.centres, master.centres)
@@ -55,8 +55,8 @@ class Opposite:
         master, near, radius = self.master, self.near, self.radius
         if near.size == 0 or master.count == 0:
             return
-        radii, centres, own = master.radii, slave.centres, slave.radii
-        # Masses of the functions of a facet are found at its points.
+        master_radii, centres, slave_radii = master.radii, slave.centres, slave.radii
+        # The dual functions take k x k numbers at each point of a pair.
         most = CHUNK // slave.nodes.shape[1] ** 2
         for row, j in in_balls(master.centres, centres[near], radius, most):
             i = near[row]
@@ -64,7 +64,7 @@ class Opposite:
             height = np.einsum("pd,pd->p", offset, slave.normal[i])
             aside = np.sqrt(np.maximum(np.einsum("pd,pd->p", offset, offset) - height**2, 0.0))
             opposite = -np.einsum("pd,pd->p", slave.normal[i], master.normal[j])
-            keep = (aside <= own[i] + radii[j]) & (opposite > FACING)
+            keep = (aside <= slave_radii[i] + master_radii[j]) & (opposite > FACING)
             keep &= np.abs(height) <= self.reach
             yield i[keep], j[keep]
 
@@ -77,17 +77,17 @@ def in_balls(
     counts = tree.query_ball_point(centres, radius, return_length=True)
     ends = np.cumsum(counts) // max(most, 1)
     for chosen in np.split(np.arange(len(centres)), np.flatnonzero(np.diff(ends)) + 1):
-        found = tree.query_ball_point(centres[chosen], radius[chosen], return_sorted=True)
-        row = np.repeat(chosen, [len(near) for near in found])
-        yield row, np.array([k for near in found for k in near], dtype=np.intp)
+        members = tree.query_ball_point(centres[chosen], radius[chosen], return_sorted=True)
+        row = np.repeat(chosen, [len(near) for near in members])
+        yield row, np.array([k for near in members for k in near], dtype=np.intp)
 
 
 def nearest(comm: MPI.Intracomm, points: Array, places: Array) -> Array:
     """Return the distance of points to the nearest place of any rank, inf without. Collective."""
     point, rank = _holders(bounding_boxes(comm, places), points)
     asked_by, asked = exchanged(comm, rank, points[point])
-    found = cKDTree(places).query(asked)[0] if len(places) else np.full(len(asked), np.inf)
-    _, distance = exchanged(comm, asked_by, found)
+    distances = cKDTree(places).query(asked)[0] if len(places) else np.full(len(asked), np.inf)
+    _, distance = exchanged(comm, asked_by, distances)
     least = np.full(len(points), np.inf)
     np.minimum.at(least, point[np.argsort(rank, kind="stable")], distance)
     return least
@@ -107,9 +107,9 @@ def nearest_named(
     source, number, centre, size = exchanged(
         comm, rank, among[ball], points[among][ball], radius[ball]
     )
-    found = cKDTree(places).query_ball_point(centre, size) if len(places) else []
-    counts = np.array([len(near) for near in found], dtype=np.intp)
-    near = np.array([k for some in found for k in some], dtype=np.intp)
+    members = cKDTree(places).query_ball_point(centre, size) if len(places) else []
+    counts = np.array([len(near) for near in members], dtype=np.intp)
+    near = np.array([k for some in members for k in some], dtype=np.intp)
     row = np.repeat(np.arange(counts.size), counts)
     _, number, place, name = exchanged(comm, source[row], number[row], places[near], names[near])
     order = np.lexsort((*place.T[::-1], number))
@@ -148,7 +148,7 @@ def _holders(every: Array, points: Array) -> tuple[NDArray[np.intp], NDArray[np.
     none = np.zeros(0, dtype=np.intp)
     if filled.size == 0 or len(points) == 0:
         return none, none
-    # Of boxes around all points first: most ranks are far from these.
+    # First by a ball around all points: most ranks are far from it.
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     extent = np.linalg.norm(points.max(axis=0) - middle)
     bounds = [_distances(every[rank], middle[None]) for rank in filled]
@@ -157,7 +157,7 @@ def _holders(every: Array, points: Array) -> tuple[NDArray[np.intp], NDArray[np.
     bounds = [_distances(every[rank], points) for rank in filled]
     allowed = np.min([most for _, most in bounds], axis=0)
     chosen = [np.flatnonzero(least <= allowed) for least, _ in bounds]
-    ranks = np.repeat(filled, [own.size for own in chosen])
+    ranks = np.repeat(filled, [part.size for part in chosen])
     return np.concatenate(chosen), ranks
 
 
@@ -165,16 +165,16 @@ def within(
     places: Array, source: NDArray[np.intp], centres: Array, radius: Array
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the places in balls or beside them, and the ranks of these balls."""
-    # Balls of a rank that are alike in size are taken for equally large.
+    # Balls of one rank and the same power of two take the largest radius among them.
     if len(places) == 0 or len(centres) == 0:
         return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
     size = np.ceil(np.log2(radius)).astype(np.intp)
-    found = np.zeros((0, 2), dtype=np.intp)
+    pairs = np.zeros((0, 2), dtype=np.intp)
     for rank, exponent in np.unique(np.column_stack([source, size]), axis=0):
         group = (source == rank) & (size == exponent)
         far = radius[group].max() * (1 + 100 * ROUNDING)
         distance = cKDTree(centres[group]).query(places, distance_upper_bound=far)[0]
         inside = np.flatnonzero(np.isfinite(distance))
-        found = np.concatenate([found, np.column_stack([np.full(inside.size, rank), inside])])
-    ranks, facets = np.unique(found, axis=0).T
+        pairs = np.concatenate([pairs, np.column_stack([np.full(inside.size, rank), inside])])
+    ranks, facets = np.unique(pairs, axis=0).T
     return facets, ranks

@@ -62,20 +62,20 @@ def _cut(polygon: Array, count: NDArray[np.intp], height: Array) -> tuple[Array,
     following = np.where(
         np.arange(1, most + 1)[None, :] < count[:, None], np.arange(1, most + 1), 0
     )
-    after = np.take_along_axis(polygon, following[:, :, None], axis=1)
-    there = np.take_along_axis(height, following, axis=1)
+    next_corner = np.take_along_axis(polygon, following[:, :, None], axis=1)
+    next_height = np.take_along_axis(height, following, axis=1)
     inside = (height >= 0) & present
-    crosses = ((height >= 0) != (there >= 0)) & present
-    slope = np.where(crosses, height - there, 1.0)
-    crossing = polygon + (height / slope)[:, :, None] * (after - polygon)
-    # Of each edge its beginning where that is inside, then the crossing.
+    crosses = ((height >= 0) != (next_height >= 0)) & present
+    slope = np.where(crosses, height - next_height, 1.0)
+    crossing = polygon + (height / slope)[:, :, None] * (next_corner - polygon)
+    # Each edge gives its first corner if that is inside, then its crossing.
     emitted = np.stack([inside, crosses], axis=2).reshape(n, 2 * most)
     corners = np.stack([polygon, crossing], axis=2).reshape(n, 2 * most, 2)
     order = np.argsort(~emitted, axis=1, kind="stable")[:, :most]
     kept = np.take_along_axis(corners, order[:, :, None], axis=1)
-    left = emitted.sum(axis=1)
-    kept[np.arange(most)[None, :] >= left[:, None]] = 0.0
-    return kept, left
+    corner_count = emitted.sum(axis=1)
+    kept[np.arange(most)[None, :] >= corner_count[:, None]] = 0.0
+    return kept, corner_count
 
 
 @dataclass(frozen=True)
@@ -107,19 +107,21 @@ def common_points(
     its `direction`, a unit vector, shape (f, d).
     """
     i, j = pairs
-    own, other = _on_planes(slave, i, direction[i], (slave.points[i], master.points[j]))
-    pair, y, weight = _quadrature(slave, master, pairs, own, other)
-    i, j, own, other = i[pair], j[pair], own[pair], other[pair]
+    slave_nodes, master_nodes = _on_planes(
+        slave, i, direction[i], (slave.points[i], master.points[j])
+    )
+    pair, y, weight = _quadrature(slave, master, pairs, slave_nodes, master_nodes)
+    i, j, slave_nodes, master_nodes = i[pair], j[pair], slave_nodes[pair], master_nodes[pair]
     on_slave, on_master = (
         pulled_back(side.shape, nodes[..., : slave.shape.dim], y)
-        for side, nodes in ((slave, own), (master, other))
+        for side, nodes in ((slave, slave_nodes), (master, master_nodes))
     )
     sides = (
         _SidePoints(master, j, on_master, direction[i], 1.0),
         _SidePoints(slave, i, on_slave, direction[i], -1.0),
     )
     clear, change, curved = np.zeros((3, pair.size))
-    for side, nodes in zip(sides, (other, own), strict=True):
+    for side, nodes in zip(sides, (master_nodes, slave_nodes), strict=True):
         clear += side.of_facets(nodes[..., -1])
         if side.surface.order == 1 and not side.surface.refined:
             height = side.height()
@@ -129,7 +131,7 @@ def common_points(
     depth, across = np.full(slave.count, -np.inf), np.einsum("fd,fd->f", slave.normal, direction)
     np.maximum.at(depth, i, -_least_distance(clear, gap, sides) * across[i])
     bears = weight != 0
-    weight = weight[bears] * _measure(slave, i[bears], on_slave[bears], own[bears])
+    weight = weight[bears] * _measure(slave, i[bears], on_slave[bears], slave_nodes[bears])
     gaps = gap[bears], (clear + curved)[bears]
     return Points(i[bears], j[bears], on_slave[bears], on_master[bears], weight, *gaps, depth)
 
@@ -184,22 +186,26 @@ def _quadrature(
     slave: Surface,
     master: Surface,
     pairs: tuple[NDArray[np.intp], NDArray[np.intp]],
-    own: Array,
-    other: Array,
+    slave_nodes: Array,
+    master_nodes: Array,
 ) -> tuple[NDArray[np.intp], Array, Array]:
     """Return pair, point on the plane and weight of all quadrature points, ascending by pair."""
     exact = _degrees(slave, master, *pairs)
     none = np.zeros(0, dtype=np.intp), np.zeros((0, slave.shape.dim)), np.zeros(0)
-    found: list[tuple[NDArray[np.intp], Array, Array]] = [none]
+    points: list[tuple[NDArray[np.intp], Array, Array]] = [none]
     for degree in np.unique(exact):
         chosen = np.flatnonzero(exact == degree)
-        one, two = _pieces(slave, own[chosen]), _pieces(master, other[chosen])
-        parts = [_common(one, two, int(degree))]
-        for side, nodes, pieces in ((slave, own, two), (master, other, one)):
+        slave_pieces = _pieces(slave, slave_nodes[chosen])
+        master_pieces = _pieces(master, master_nodes[chosen])
+        parts = [_common(slave_pieces, master_pieces, int(degree))]
+        for side, nodes, pieces in (
+            (slave, slave_nodes, master_pieces),
+            (master, master_nodes, slave_pieces),
+        ):
             if side.order > 1 and side.shape.dim > 1:
                 parts.append(_slivers(side, nodes[chosen], pieces, int(degree)))
-        found += [(chosen[pair], y, weight) for pair, y, weight in parts]
-    pair, y, weight = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
+        points += [(chosen[pair], y, weight) for pair, y, weight in parts]
+    pair, y, weight = (np.concatenate(arrays) for arrays in zip(*points, strict=True))
     order = np.argsort(pair, kind="stable")
     return pair[order], y[order], weight[order]
 
@@ -241,17 +247,19 @@ def _pieces(side: Surface, nodes: Array) -> Array:
     return nodes[:, shape.pieces(side.order)[:, shape.around], : shape.dim]
 
 
-def _common(own: Array, other: Array, degree: int) -> tuple[NDArray[np.intp], Array, Array]:
+def _common(
+    slave_pieces: Array, master_pieces: Array, degree: int
+) -> tuple[NDArray[np.intp], Array, Array]:
     """Return pair, point and weight of the points of a rule, and of corners, on common parts."""
-    first, second = own[:, :, None], other[:, None]
+    first, second = slave_pieces[:, :, None], master_pieces[:, None]
     low = np.maximum(first.min(axis=3), second.min(axis=3))
     high = np.minimum(first.max(axis=3), second.max(axis=3))
     pair, a, b = np.nonzero(np.all(high > low, axis=3))
-    if own.shape[3] == 1:
+    if slave_pieces.shape[3] == 1:
         shape, part = INTERVAL, np.stack([low, high], axis=3)[pair, a, b]
     else:
         shape = TRIANGLE
-        polygon, count = clipped(own[pair, a], other[pair, b])
+        polygon, count = clipped(slave_pieces[pair, a], master_pieces[pair, b])
         # A fan about the first corner.
         fan = np.arange(1, polygon.shape[1] - 1)
         row, k = np.nonzero(fan + 1 < count[:, None])
@@ -270,7 +278,7 @@ def _common(own: Array, other: Array, degree: int) -> tuple[NDArray[np.intp], Ar
 def _slivers(
     side: Surface, nodes: Array, by: Array, degree: int
 ) -> tuple[NDArray[np.intp], Array, Array]:
-    """Return the same between curved edges of facets and their straight pieces."""
+    """Return the points, as `_common`, between curved edges and their chords, within `by`."""
     # Half of an edge from p along e, its middle by b aside: p + t e + s t (1 - t) b, with the
     # measure t (1 - t) |e x b|, negative where the edge bends inwards.
     shape, flat = side.shape, nodes[..., :2]

@@ -98,7 +98,7 @@ class Surface:
     def moved(self, displacement: Array) -> Surface:
         """Return the surface at a displacement of the owned nodes, shape (nodes, d). Collective."""
         shape, begin, d = self.shape, self.owners.begin, displacement.shape[1]
-        u = self.owners.values(self.nodes.ravel(), lambda given: displacement[given - begin])
+        u = self.owners.values(self.nodes.ravel(), lambda numbers: displacement[numbers - begin])
         functions = shape.lagrange(self.degree, shape.nodes(self.order))
         points = self.points + functions @ u.reshape(*self.nodes.shape, d)
         before, after = (
@@ -213,14 +213,14 @@ class Surface:
         offset = shape.nodes(self.order) - shape.middle
         aside = self.points - middle - np.einsum("fdr,kr->fkd", slope, offset)
         aside = aside @ slope @ inverse(slope.swapaxes(1, 2) @ slope)
-        found = np.abs(aside).sum(axis=2).max(axis=1, initial=0.0)
-        return np.asarray(np.where(found > NEGLIGIBLE, found, 0.0))
+        deviation = np.abs(aside).sum(axis=2).max(axis=1, initial=0.0)
+        return np.asarray(np.where(deviation > NEGLIGIBLE, deviation, 0.0))
 
     def sent(self, facets: NDArray[np.intp], ranks: NDArray[np.intp]) -> Surface:
         """Send facets of this rank to ranks, and return those that it is sent. Collective."""
         every = self.nodes, self.points, self.normal, self.deviation, self.unknown, self.change
-        _, *found = exchanged(self.owners.comm, ranks, *(array[facets] for array in every))
-        nodes, points, normal, deviation, unknown, change = found
+        _, *arrays = exchanged(self.owners.comm, ranks, *(array[facets] for array in every))
+        nodes, points, normal, deviation, unknown, change = arrays
         return replace(
             self,
             nodes=nodes,
@@ -285,10 +285,10 @@ class Surface:
             least, most = 1.1 * np.maximum(inside, edge)[:, facets]
             return -least, most
         along, products = self._bubbles(at)
-        known, off = self.height(facets, at), along * products * self.change[facets]
+        height, off = self.height(facets, at), along * products * self.change[facets]
         # The sum of the arcs over the edges of a facet in a sphere is off by less than that.
-        slack = off.sum(axis=1) + self.turns[facets] ** 2 / 8 * np.abs(known)
-        return known - slack, known + slack
+        slack = off.sum(axis=1) + self.turns[facets] ** 2 / 8 * np.abs(height)
+        return height - slack, height + slack
 
     def _bubbles(self, at: Array) -> tuple[Array, Array]:
         """Return the shares of the edges at points, and l_i l_j on them, shape (p, edges)."""
@@ -314,14 +314,14 @@ class Surface:
         rise, other, _ = deviations(corners, self.points, self.normal, self.owners, values=values)
         along, products = self._bubbles(places)
         bubbles, finite = (along * products).T, np.all(np.isfinite(values), axis=1)
-        there = np.where(finite[:, None], values, 0.0) @ self.shape.lagrange(1, places).T
-        parts = there + rise @ bubbles, self.unknown @ bubbles, other @ bubbles, finite[:, None]
-        together = np.stack([*np.broadcast_arrays(*parts), np.ones_like(there)], axis=2)
+        linear = np.where(finite[:, None], values, 0.0) @ self.shape.lagrange(1, places).T
+        parts = linear + rise @ bubbles, self.unknown @ bubbles, other @ bubbles, finite[:, None]
+        together = np.stack([*np.broadcast_arrays(*parts), np.ones_like(linear)], axis=2)
         nodes, sums = self.owners.sums(self.nodes.ravel(), together.reshape(-1, 5))
-        told, mine, other, finite = (sums[:, :4] / sums[:, 4:]).T
+        nodal_values, mine, other, finite = (sums[:, :4] / sums[:, 4:]).T
         share = np.where(finite == 1, mine / np.where(mine + other > 0, mine + other, 1.0), 0.0)
         weight = share**SHARP / (share**SHARP + (1 - share) ** SHARP)
-        return nodes, np.column_stack([told, weight, (1 - weight) * mine + weight * other])
+        return nodes, np.column_stack([nodal_values, weight, (1 - weight) * mine + weight * other])
 
     def distance(self, facets: NDArray[np.intp], at: Array, direction: Array) -> Array:
         """Return the distance of the surface from points of straight facets along rays, (p,).
@@ -329,15 +329,15 @@ class Surface:
         With the foot of each point of an arc beside the origin of its ray, to the fourth order. The
         directions of the rays are unit vectors, shape (p, d), the points those of `height`.
         """
-        found = np.zeros(len(at))
+        distance = np.zeros(len(at))
         if not self.deviation.any():
-            return found
+            return distance
         slope = self.slopes(facets, at)
         aside = np.einsum("pdr,pd->pr", slope @ inverse(slope.swapaxes(1, 2) @ slope), direction)
         rise = np.einsum("pd,pd->p", self.normal[facets], direction)
         for _ in range(6):  # each takes the error by the product of two small slopes
-            found = self.height(facets, at + found[:, None] * aside) / rise
-        return found
+            distance = self.height(facets, at + distance[:, None] * aside) / rise
+        return distance
 
     def distance_bounds(
         self, facets: NDArray[np.intp], at: Array, direction: Array
@@ -347,21 +347,21 @@ class Surface:
         least, most = (height / rise for height in self.height_bounds(facets, at))
         if self.refined:
             return np.minimum(least, most), np.maximum(least, most)
-        known, slack = self.distance(facets, at, direction), np.abs(most - least) / 2
+        distance, slack = self.distance(facets, at, direction), np.abs(most - least) / 2
         if self.order == 1:
             # An error of third order is largest beside the middle, up to four times the bubble;
             # spheres have one.
             most = self.change[facets].sum(axis=1) / np.abs(rise)
             slack = np.maximum(self.shape.dim * slack, np.minimum(4 * slack, most))
-        return known - slack, known + slack
+        return distance - slack, distance + slack
 
     @property
     def node_heights(self) -> Array:
         """Height of the surface at nodes in gaps, and its lower bound, shape (f, k, 2) (length)."""
         places = self.shape.nodes(self.degree)
         facets, at = np.repeat(np.arange(self.count), len(places)), np.tile(places, (self.count, 1))
-        known = self.height(facets, at) if self.follows else np.zeros(len(at))
-        both = np.column_stack([known, self.height_bounds(facets, at)[0]])
+        height = self.height(facets, at) if self.follows else np.zeros(len(at))
+        both = np.column_stack([height, self.height_bounds(facets, at)[0]])
         return both.reshape(self.count, len(places), 2)
 
     def measures(self, at: Array, weights: Array) -> Array:
@@ -375,10 +375,10 @@ class Surface:
 
     def normals(self, facets: NDArray[np.intp], slopes: Array) -> Array:
         """Return unit normals out of the body, (..., d), of facets with dx/dxi, (..., d, dim)."""
-        found = area_vectors(slopes)
-        found /= np.linalg.norm(found, axis=-1, keepdims=True)
-        sign = np.sign(np.einsum("...d,...d->...", found, self.normal[facets]))
-        return np.asarray(found * sign[..., None])
+        normals = area_vectors(slopes)
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        sign = np.sign(np.einsum("...d,...d->...", normals, self.normal[facets]))
+        return np.asarray(normals * sign[..., None])
 
 
 def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
