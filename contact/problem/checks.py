@@ -46,8 +46,8 @@ def expected_displacements(
     force = body.comm.allreduce(float(nodal), op=MPI.SUM)
     force += np.abs(body.motion(loads)[motions]).sum()
     moved = body.motion(prescribed)[motions]
-    given = np.abs(np.append(body.nodal(prescribed)[:, : body.dim], moved))
-    largest = body.comm.allreduce(float(given.max(initial=0.0)), op=MPI.MAX)
+    displacements = np.abs(np.append(body.nodal(prescribed)[:, : body.dim], moved))
+    largest = body.comm.allreduce(float(displacements.max(initial=0.0)), op=MPI.MAX)
     return float(force / scales.area / scales.young * scales.size), largest
 
 
@@ -64,10 +64,10 @@ def check_problem(
         check_presses(problem)
     _check_plane_stress(problem)
     _check_loaded_parts(problem)
-    for there in [problem.at(time) for time in times] or [problem]:
-        _check_sizes(there)
-        check_supports(there)
-        check_rigid_modes(there)
+    for step_problem in [problem.at(time) for time in times] or [problem]:
+        _check_sizes(step_problem)
+        check_supports(step_problem)
+        check_rigid_modes(step_problem)
 
 
 def check_presses(problem: ContactProblem) -> None:
@@ -144,11 +144,11 @@ def check_supports(problem: ContactProblem) -> None:
             continue
         nodes = fem.locate_dofs_topological(space, problem.dim - 1, facets)
         for name in sorted(first.given.keys() & last.given.keys()):
-            found = _differing(problem, (i, j), name, nodes)
-            if found is not None:
+            values = _differing(problem, (i, j), name, nodes)
+            if values is not None:
                 when = "" if time == 1.0 else f" at t = {time:g}"
                 raise InputError(
-                    f"fixed.{j}.{name}: {found[1]:g} on {last.on}; accepted: {found[0]:g}, "
+                    f"fixed.{j}.{name}: {values[1]:g} on {last.on}; accepted: {values[0]:g}, "
                     f"as fixed.{i} has there{when}",
                     "supports",
                 )
@@ -168,14 +168,14 @@ def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterato
             continue
         for name in names:
             for time in times:
-                found = _differing(problem.at(time), (i, j), name, nodes)
-                if found is None:
+                values = _differing(problem.at(time), (i, j), name, nodes)
+                if values is None:
                     continue
                 when = "" if time == 1.0 else f" at t = {time:g}"
-                place = ", ".join(f"{x:.4g}" for x in found[2:])
+                place = ", ".join(f"{x:.4g}" for x in values[2:])
                 yield (
                     f"fixed.{i} and fixed.{j}: {first.on} and {last.on} meet at ({place}), where "
-                    f"{name} is {found[0]:g} of the first and {found[1]:g} of the second{when}: "
+                    f"{name} is {values[0]:g} of the first and {values[1]:g} of the second{when}: "
                     "the second counts at their common nodes, and fields beside them grow with "
                     "each refinement"
                 )
@@ -194,17 +194,17 @@ def _differing(
     values = np.zeros((len(points), 2))
     for k, number in enumerate(pair):
         fixed, key = problem.description.fixed[number], f"fixed.{number}.{name}"
-        given = values_at(fixed.given[name], points, problem.time, key, problem.comm)
-        values[:, k] = fixed.factor(problem.time) * given
+        prescribed = values_at(fixed.given[name], points, problem.time, key, problem.comm)
+        values[:, k] = fixed.factor(problem.time) * prescribed
     size = problem.comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX)
     # sin(pi) is 0.
     unit = problem.body.phi_scale if name == "potential" else 1.0
     rounding = EPS * problem.domain.size
     differ = np.ptp(values, axis=1) > NEGLIGIBLE * size + unit * rounding
     points = np.where(np.abs(points) < rounding, 0.0, points)
-    some = np.column_stack([values, points])[differ][:1]
-    found = np.concatenate(problem.comm.allgather(some)) + 0.0  # no -0
-    return found[0] if found.size > 0 else None
+    local_row = np.column_stack([values, points])[differ][:1]
+    differing = np.concatenate(problem.comm.allgather(local_row)) + 0.0  # no -0
+    return differing[0] if differing.size > 0 else None
 
 
 def check_rigid_modes(problem: ContactProblem) -> None:
@@ -228,20 +228,21 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
     if unconstrained.shape[1] > 0:
         raise InputError(_unconstrained(group, unconstrained), "unsupported")
     support = UnilateralSupport.of(group)
-    found = None if support is None else support.release(problem.time)
-    if found is None:
+    release = None if support is None else support.release(problem.time)
+    if release is None:
         return
-    if not found.saturated:
+    if not release.saturated:
         raise InputError(
             f"the loads {PULLED_OFF}, and no support holds it there; accepted: loads that press it "
             "on, or more displacement components fixed",
             "pulled-off",
         )
-    words, along = mode_names(found.motion[:, None], group.names), group.translation(found.motion)
+    words = mode_names(release.motion[:, None], group.names)
+    along = group.translation(release.motion)
     if along is None:
-        sums = f"{_told_apart(found.power / found.resisted, 1.0)[0]} times its resistance"
+        sums = f"{_distinct(release.power / release.resisted, 1.0)[0]} times its resistance"
     else:
-        loads, borne = _told_apart(found.power / along, found.resisted / along)
+        loads, borne = _distinct(release.power / along, release.resisted / along)
         sums = f"{loads}, it bears less than {borne}"
     raise InputError(
         f"the loads {PUSHED_THROUGH} ({words}): they are {sums}, with its largest "
@@ -251,10 +252,10 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
     )
 
 
-def _told_apart(one: float, other: float) -> tuple[str, str]:
-    """Return two numbers with as many digits, from six to twelve, as tell them apart."""
-    every = [(f"{one:.{digits}g}", f"{other:.{digits}g}") for digits in range(6, 13)]
-    return next((both for both in every if both[0] != both[1]), every[0])
+def _distinct(one: float, other: float) -> tuple[str, str]:
+    """Return two numbers with the fewest digits, from six to twelve, that distinguish them."""
+    pairs = [(f"{one:.{digits}g}", f"{other:.{digits}g}") for digits in range(6, 13)]
+    return next((both for both in pairs if both[0] != both[1]), pairs[0])
 
 
 def _unconstrained(group: Group, unconstrained: Array) -> str:
@@ -305,15 +306,15 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     floating = null_space(gram / max(np.trace(gram), 1.0))
     if floating.shape[1] == 0:
         return
-    where, known = "", "a conductive foundation"
+    where, grounding = "", "a conductive foundation"
     if count > 1:
         alone = np.flatnonzero(np.linalg.norm(floating[:count], axis=1) > 1e-6)
         middles = [middle(problem, body.layout.points[component == k])[0] for k in alone]
         where = f" of the component of the mesh about {places(np.array(middles))}"
-        known += ", or with a body that conducts and whose potential is known"
+        grounding += ", or with a body that conducts and whose potential is known"
     raise InputError(
         f"the potential{where} is not determined: it is prescribed nowhere, and the foundation "
-        f"conducts nowhere; accepted: a potential fixed on a part, or contact with {known}",
+        f"conducts nowhere; accepted: a potential fixed on a part, or contact with {grounding}",
         "ungrounded",
     )
 
@@ -326,11 +327,11 @@ def _flows(
     law, held = interface.foundation, interface.fixed_conducting
     if state is None:
         return _conducts(law, interface.size), _conducts(held, interface.size)
-    found = [
+    charged = [
         law.charge_block(jump, pressure, full=True)[:, -1, -1] != 0
         for law, jump, pressure in interface.acting(state.x, state.forces)
     ]
-    return found[0], found[1] if held is not None else np.zeros(0, dtype=bool)
+    return charged[0], charged[1] if held is not None else np.zeros(0, dtype=bool)
 
 
 def _conducts(law: FoundationLaw | None, deep: float) -> NDArray[np.bool_]:

@@ -65,7 +65,7 @@ class CondensedEquilibrium:
         All of S, on the first rank.
     residual
         r_0: condensed internal forces minus loads at the linearisation, of all ranks.
-    x_0, own
+    x_0, local_rows
         The owned retained unknowns there, and their slice among those of all ranks.
     acting
         `norms` of loads, reactions and coupling forces of the whole body.
@@ -82,7 +82,7 @@ class CondensedEquilibrium:
     stiffness: DenseStiffness
     residual: Array
     x_0: Array
-    own: slice
+    local_rows: slice
     acting: Array
     component_norms: ComponentNorms
     inclined: Inclined | None = None
@@ -119,7 +119,7 @@ class CondensedEquilibrium:
     def internal_forces(self, state: LinearisationPoint) -> Array:
         """Return S (x - x_0) + r_0, r_0 the condensed F - f, which has the loads. Collective."""
         moved = np.concatenate(self.comm.allgather(state.x - self.x_0))
-        return np.asarray(self.rows @ moved + self.residual[self.own])
+        return np.asarray(self.rows @ moved + self.residual[self.local_rows])
 
     #: A linear body is its own secant.
     secant_forces = internal_forces
@@ -213,15 +213,15 @@ class Condensation:
         unknowns = body.global_unknowns
         none = Transformation(body.layout, None, unknowns.ties, unknowns.free)
         self._transformation = problem.transformation or none
-        rest = BodyState(body.zero_displacement())
-        self._bulk = TransformedBulk(body, self._transformation, rest)
+        reference = BodyState(body.zero_displacement())
+        self._bulk = TransformedBulk(body, self._transformation, reference)
         self._free = np.flatnonzero(self._transformation.free)
         self._matrix = self._bulk.create_matrix()
         size = body.block_size
         retained = (self.nodes[:, None] * size + np.arange(size)).astype(np.int32).ravel()
         self._schur = SchurComplement(self._matrix, retained, PREFIX)
         begin = self._schur.offset
-        self._own = slice(begin, begin + retained.size)
+        self._local_rows = slice(begin, begin + retained.size)
         self._kind = ""
         self._rows: Array = np.zeros((0, 0))
         self._stiffness = DenseStiffness(self._rows)
@@ -271,7 +271,7 @@ class Condensation:
             stiffness=self._stiffness,
             residual=forces,
             x_0=np.concatenate([nodes.jump(state.x), others]).ravel(),
-            own=self._own,
+            local_rows=self._local_rows,
             acting=acting,
             component_norms=body.component_norms.at(self.nodes),
             inclined=inclined,
@@ -342,15 +342,15 @@ class Condensation:
 
     def _scattered(self, stiffness: Array) -> Array:
         """Scatter the rows of a matrix on the first rank. Collective."""
-        comm, own = self.whole_problem.comm, self._own
-        every = comm.gather(own)
+        comm, local_rows = self.whole_problem.comm, self._local_rows
+        all_rows = comm.gather(local_rows)
         if comm.rank > 0:
-            rows = np.empty((own.stop - own.start, self._schur.size))
+            rows = np.empty((local_rows.stop - local_rows.start, self._schur.size))
             comm.Recv(rows, 0)
             return rows
-        for rank, other in enumerate(every[1:], 1):
-            comm.Send(np.ascontiguousarray(stiffness[other]), rank)
-        return stiffness[own]
+        for rank, rank_rows in enumerate(all_rows[1:], 1):
+            comm.Send(np.ascontiguousarray(stiffness[rank_rows]), rank)
+        return stiffness[local_rows]
 
     def expand(self, condensed_problem: CondensedProblem, x: Array) -> Array:
         """Return the increment of the whole body's owned unknowns. Collective.

@@ -114,8 +114,8 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     weak = np.where(active.closed, np.abs(forces.contact) <= small, c * normal_gap <= small)
     if interface.friction.acts:
         bound = interface.bound(jump, forces)
-        left = np.abs(bound - np.linalg.norm(forces.friction, axis=1))
-        weak |= active.sticks & active.closed & (left < small) & (bound > 0)
+        margin = np.abs(bound - np.linalg.norm(forces.friction, axis=1))
+        weak |= active.sticks & active.closed & (margin < small) & (bound > 0)
         weak |= active.slips & (c * length < small)
     weak |= interface.foundation.kinks(jump, max(small / c, EPS * interface.size))
     return problem.nodes.gather(problem.nodes.points[weak])
@@ -195,19 +195,19 @@ class Linearised:
     def solve(self, change: Equations) -> tuple[Array, Array]:
         """Return dx on the owned unknowns and df with J (dx, df) = -change. Collective."""
         nodes = self.problem.nodes
-        rhs, left = -change.forces, -change.conditions
-        x, f = np.zeros_like(rhs), np.zeros_like(left)
+        rhs, residual = -change.forces, -change.conditions
+        x, f = np.zeros_like(rhs), np.zeros_like(residual)
         size, steps = 0.0, list[float]()
         while True:
-            known = np.einsum("nij,nj->ni", self._regular, left)
-            nodes.add_jump_transposed(-nodes.weight[:, None] * known, rhs)
+            df_0 = np.einsum("nij,nj->ni", self._regular, residual)
+            nodes.add_jump_transposed(-nodes.weight[:, None] * df_0, rhs)
             dx = self._operator.solve(rhs, EPS)
             moved = nodes.jump(self.problem.body.local(dx))
-            df = known - np.einsum(
+            df = df_0 - np.einsum(
                 "nij,nj->ni", self._regular, np.einsum("nij,nj->ni", self._by_jump, moved)
             )
             x, f = x + dx, f + df
-            left = left - self._conditions_of(moved, df)
+            residual = residual - self._conditions_of(moved, df)
             rhs -= self._operator.multiply(dx)  # rounding of stiff blocks: iterative refinement
             size, steps = max(size, self._norm(x, f)), [*steps, self._norm(dx, df)]
             if self._enough(steps, size):
@@ -216,18 +216,20 @@ class Linearised:
     def solve_transposed(self, by_x: Array, by_force: Array) -> tuple[Array, Array]:
         """Return w with J^T w = (by_x, by_force), shapes (owned,) and (n, d). Collective."""
         nodes, weight = self.problem.nodes, self.problem.nodes.weight[:, None]
-        rhs, left = by_x.copy(), by_force
-        x, c = np.zeros_like(rhs), np.zeros_like(left)
+        rhs, residual = by_x.copy(), by_force
+        x, c = np.zeros_like(rhs), np.zeros_like(residual)
         size, steps = 0.0, list[float]()
         while True:
-            known = np.einsum("nji,nj->ni", self._regular, left)
-            nodes.add_jump_transposed(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
+            dc_0 = np.einsum("nji,nj->ni", self._regular, residual)
+            nodes.add_jump_transposed(-np.einsum("nji,nj->ni", self._by_jump, dc_0), rhs)
             dx = self._operator.solve_transposed(rhs)
             moved = weight * nodes.jump(self.problem.body.local(dx))[:, : nodes.dim]
-            dc = known - np.einsum("nji,nj->ni", self._regular, moved)
+            dc = dc_0 - np.einsum("nji,nj->ni", self._regular, moved)
             x, c = x + dx, c + dc
-            by_jump, by_own = self._smoothed_transposed(dc)
-            left = left - moved - np.einsum("nji,nj->ni", self._by_force, dc) - by_own
+            by_jump, by_multiplier = self._smoothed_transposed(dc)
+            residual = (
+                residual - moved - np.einsum("nji,nj->ni", self._by_force, dc) - by_multiplier
+            )
             rhs -= self._operator.multiply(dx, transposed=True)
             nodes.add_jump_transposed(-by_jump, rhs)
             size, steps = max(size, self._norm(x, c)), [*steps, self._norm(dx, dc)]
@@ -238,10 +240,10 @@ class Linearised:
         """Return the derivatives by the gap at each node, (n,), from the adjoint. Collective."""
         nodes, d = self.problem.nodes, self.problem.dim
         by_normal = np.einsum("nij,nj->ni", self._by_jump[:, :, :d], nodes.normal)
-        found = np.einsum("ni,ni->n", conditions, by_normal)
+        by_conditions = np.einsum("ni,ni->n", conditions, by_normal)
         moved = nodes.jump(self.problem.body.local(x))
         pressed = nodes.weight * nodes.normal_component(moved)
-        return found + pressed * np.einsum("ni,ni->n", self._layer[:, :d], nodes.normal)
+        return by_conditions + pressed * np.einsum("ni,ni->n", self._layer[:, :d], nodes.normal)
 
     def _conditions_of(self, moved: Array, f: Array) -> Array:
         """Return C_u du + C_f df, with the smoothed pressure. Collective."""

@@ -63,11 +63,11 @@ def approached(
             continue
         normal_gap = interface.normal_gap(nodes.jump(x))
         closing = -nodes.normal_component(nodes.motion @ push)
-        mine = np.abs(nodes.motion[:, :, member.columns]).max(axis=(1, 2), initial=0.0) > 0
-        way = np.full(normal_gap.size, np.inf)
-        there = mine & (closing > 0)
-        way[there] = normal_gap[there] / closing[there]
-        least = nodes.comm.allreduce(float(way.min(initial=np.inf)), op=MPI.MIN)
+        moved = np.abs(nodes.motion[:, :, member.columns]).max(axis=(1, 2), initial=0.0) > 0
+        travel = np.full(normal_gap.size, np.inf)
+        closes = moved & (closing > 0)
+        travel[closes] = normal_gap[closes] / closing[closes]
+        least = nodes.comm.allreduce(float(travel.min(initial=np.inf)), op=MPI.MIN)
         if 0 < least < np.inf:
             x = x.copy()
             x[x.size - global_unknowns.size :] += least * push
@@ -145,13 +145,13 @@ class ContactProblem:
         self.domain = domain
         expect("domain", domain, "Domain.from_mesh(...), from_msh(...)", isinstance(domain, Domain))
         expect("body", body, "Body(...)", isinstance(body, Body))
-        given = several("contact", contact, Contact, "Contact(part), or several")
-        expect("contact", contact, "Contact(part), or several", given)
+        contacts = several("contact", contact, Contact, "Contact(part), or several")
+        expect("contact", contact, "Contact(part), or several", contacts)
         check_laws("Problem", friction, conductor)
-        moving = [Rigid(c.on, c.rigid, foundation=True) for c in given if c.rigid is not None]
+        moving = [Rigid(c.on, c.rigid, foundation=True) for c in contacts if c.rigid is not None]
         body = body.in_space(domain.dim)
         self.description = replace(body, rigid=(*moving, *body.rigid)) if moving else body
-        self.contacts = tuple(one.filled(domain, friction, conductor) for one in given)
+        self.contacts = tuple(one.filled(domain, friction, conductor) for one in contacts)
         names = [contact.name for contact in self.contacts]
         for name in names:
             if names.count(name) > 1:
@@ -162,8 +162,8 @@ class ContactProblem:
         self.body = BodyEquilibrium(domain, self.description, degree, element)
         one = len(self.contacts) == 1
         pairs = {i: (c.on, c.against, c.press) for i, c in enumerate(self.contacts) if c.against}
-        found, self.unpaired = overlap_depths(self.body, [*pairs.values()])
-        depths = dict(zip(pairs, found, strict=True))
+        pair_depths, self.unpaired = overlap_depths(self.body, [*pairs.values()])
+        depths = dict(zip(pairs, pair_depths, strict=True))
         placed = [
             self._placed("contact" if one else f"contact.{i}", contact, depths.get(i, (0.0, 0.0)))
             for i, contact in enumerate(self.contacts)
@@ -235,9 +235,9 @@ class ContactProblem:
         The state knows the time and the history of the step that led to it: the problem may be
         that of any step.
         """
-        here = self.at(state.time, state.history)
-        slip = here.interface.commit(here.nodal(state))
-        variables = self.body.laws.commit(replace(state, history=here.history))
+        step_problem = self.at(state.time, state.history)
+        slip = step_problem.interface.commit(step_problem.nodal(state))
+        variables = self.body.laws.commit(replace(state, history=step_problem.history))
         return self._history(slip, variables)
 
     @staticmethod
@@ -259,18 +259,18 @@ class ContactProblem:
             with on_all_ranks(self.comm):
                 contact.conductor.check()
         assert contact.friction is not None  # filled in above
-        body, given = self.body, (contact.obstacle, key, contact.press)
+        body, arguments = self.body, (contact.obstacle, key, contact.press)
         if contact.against is not None:
             acts = contact.friction.acts
-            return find_pair(body, contact.on, contact.against, *given, acts, overlap)
+            return find_pair(body, contact.on, contact.against, *arguments, acts, overlap)
         conducts = contact.conductor is not None and self.piezoelectric
-        return find_nodes(body, contact.on, *given, conducts)
+        return find_nodes(body, contact.on, *arguments, conducts)
 
     def _interface(self) -> Interface:
         """Return the laws of all contacts at their geometries. Collective."""
         body, geometries = self.body, self.geometries
         nodes = joined_nodes(geometries, [contact.on for contact in self.contacts], body)
-        # The softer side where bodies touch: parts far from there may be softer by far.
+        # The softer side of a pair: parts away from the contact may be much softer.
         where = self.domain, self.description.materials, body.cells
         sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
         young = max(min(young_behind(*where, side) for side in both) for both in sides)
@@ -295,7 +295,7 @@ class ContactProblem:
             ),
             c_0=stiffness,
             size=self.domain.size,
-            elongation=max(elongation(self.domain.mesh, own) for own in facets),
+            elongation=max(elongation(self.domain.mesh, part) for part in facets),
             component=body.component_norms.component[nodes.nodes],
             components=body.component_norms.count,
         )
@@ -321,17 +321,17 @@ class ContactProblem:
 
     def _scales(self) -> Scales:
         domain, law, d = self.domain, self.description.law, self.dim
-        own = self._area(domain)
+        contact_area = self._area(domain)
         # Of the mesh itself, which may be but the half plane of the body.
-        mesh_area = self._area(replace(domain, revolved=False)) if domain.revolved else own
+        mesh_area = self._area(replace(domain, revolved=False)) if domain.revolved else contact_area
         return Scales(
             young=float(law.young),
             poisson=float(law.poisson),
             bulk=float(law.bulk),
             shear=float(law.shear),
             size=domain.size,
-            height=volume(domain) / own,
-            area=own,
+            height=volume(domain) / contact_area,
+            area=contact_area,
             spacing=(mesh_area / self.nodes.size) ** (1 / (d - 1)),
         )
 

@@ -161,19 +161,19 @@ def force_rounding(
     bodies, after far motions, or in potentials across a contact with a large psi. No backward
     stable method leaves less (Rigal and Gaches, J. ACM 14 (1967) 543).
     """
-    body, (moved, there) = problem.body, perturbed or _perturbed(problem, state)
-    change = there - internal
+    body, (moved, moved_forces) = problem.body, perturbed or _perturbed(problem, state)
+    change = moved_forces - internal
     problem.interface.add_charge(change, state.x, moved - state.x, state.forces)
     return MARGIN * EPS / PERTURBATION * body.norms(body.unbalanced(change))
 
 
 def _perturbed(problem: AnyProblem, state: State) -> _Perturbed:
     """Return perturbed unknowns, and the internal forces there. Collective."""
-    body, own = problem.body, problem.body.owned_part(state.x)
+    body, unknowns = problem.body, problem.body.owned_part(state.x)
     # Global unknowns, behind those of the nodes, have the same sign on all ranks.
-    step = np.full(own.size, PERTURBATION)
+    step = np.full(unknowns.size, PERTURBATION)
     step[: body.owned] = _random_signs(body.owned)
-    moved = body.updated(state.x, step * own)
+    moved = body.updated(state.x, step * unknowns)
     return moved, body.internal_forces(replace(state, x=moved))
 
 
@@ -186,8 +186,8 @@ def _as_pressures(interface: Interface, forces: Array) -> Array:
 def residual_as_pressures(problem: AnyProblem, state: State, residual: Array) -> float:
     """Return the residual forces as pressures, over the contact pressures. Collective."""
     body, interface = problem.body, problem.interface
-    left = body.norms(body.unbalanced(residual))[0]
-    return _over_pressed(interface, state, _as_pressures(interface, left))
+    unbalanced = body.norms(body.unbalanced(residual))[0]
+    return _over_pressed(interface, state, _as_pressures(interface, unbalanced))
 
 
 def _over_pressed(interface: Interface, state: State, pressures: Array) -> float:
@@ -195,12 +195,12 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
 
     Multipliers at open nodes, and pressures that are rounding, do not count as contact.
     """
-    jump, own = interface.nodes.jump(state.x), state.forces.contact
+    jump, multiplier = interface.nodes.jump(state.x), state.forces.contact
     rounding = interface.rounding_pressure(jump)
-    on = constraint_active(own, interface.normal_gap(jump), interface.c_0, rounding)
-    pressed = interface.norms(interface.pressure(jump, state.forces) - own * ~on)
-    much = (pressed > 0) & (pressed > EPS * pressed.max())
-    return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=much).max())
+    on = constraint_active(multiplier, interface.normal_gap(jump), interface.c_0, rounding)
+    pressed = interface.norms(interface.pressure(jump, state.forces) - multiplier * ~on)
+    in_contact = (pressed > 0) & (pressed > EPS * pressed.max())
+    return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=in_contact).max())
 
 
 def evaluate(problem: AnyProblem, state: State) -> Residuals:
@@ -213,7 +213,7 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     """Return a state with its residuals and the internal forces there. Collective."""
     body, interface = problem.body, problem.interface
     loads = body.load_norms(state.time)
-    # First, as laws with history keep their last response: it is to be that of the state.
+    # Before the forces of the state, since laws with history keep their last response.
     perturbed = None if (loads > 0).all() else _perturbed(problem, state)
     internal = body.internal_forces(state)
     on_contact = np.zeros_like(internal)
@@ -226,8 +226,8 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     small = ~loaded | (unbalanced <= limit)
     rounding, contact_rounding = np.zeros_like(scale), np.zeros(interface.components)
     if small.any():
-        found = force_rounding(problem, state, internal, perturbed)
-        rounding = np.where(small, found, 0.0)
+        estimate = force_rounding(problem, state, internal, perturbed)
+        rounding = np.where(small, estimate, 0.0)
         contact_rounding = np.minimum(rounding, limit)[0]
         loaded |= exerted > rounding
         # Without loads on a component all of its forces are rounding, its own or that of others.
@@ -281,7 +281,7 @@ class Balance:
         Stored energy at its end; less charges times potentials of a piezoelectric body.
     stated
         Stored energy at its end of the laws with internal variables that state it.
-    x, given, internal
+    x, external, internal
         Local unknowns at its end; forces and charges on the owned ones, by loads and by stresses.
     """
 
@@ -292,7 +292,7 @@ class Balance:
     enthalpy: float
     stated: float
     x: Array
-    given: Array
+    external: Array
     internal: Array
 
     @staticmethod
@@ -308,7 +308,7 @@ class Balance:
             enthalpy=0.0,
             stated=0.0,
             x=x,
-            given=zero,
+            external=zero,
             internal=zero,
         )
 
@@ -343,24 +343,24 @@ def stored(problem: ContactProblem, state: State) -> float:
     that they state, NaN if they do not.
     """
     body, x = problem.body, problem.body.owned_part(state.x)
-    own = 0.0
+    energy = 0.0
     if body.laws.initial is not None:
         stated = body.laws.energies(state)[1]
-        own = np.nan if stated is None else stated
+        energy = np.nan if stated is None else stated
     forces = body.forces_without_history(state)
     electric = body.product(np.where(body.component_norms.mechanical, 0.0, x), forces)
     if body.linear:
-        return own + body.product(0.5 * forces, x) - electric
+        return energy + body.product(0.5 * forces, x) - electric
     for part, share in zip(_WAY, _SHARES, strict=True):
-        way = body.forces_without_history(replace(state, x=part * state.x))
-        own += share * body.product(way, x)
-    return own - electric
+        part_forces = body.forces_without_history(replace(state, x=part * state.x))
+        energy += share * body.product(part_forces, x)
+    return energy - electric
 
 
 def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
     """Return the energies of a step that follows another one. Collective."""
     body = problem.body
-    given, internal = working_forces(problem, state)
+    external, internal = working_forces(problem, state)
     x, x_before = body.owned_part(state.x), body.owned_part(before.x)
     plastic, stored = body.laws.energies(state)
     forces_at: Callable[[State], Array] = body.internal_forces
@@ -372,15 +372,15 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
     if body.linear:
         power = 0.5 * (internal + before.internal)
     else:
-        way = [0.5 * ((1 - s) * before.x + (1 + s) * state.x) for s in _POINTS]
-        power = 0.5 * _WEIGHTS @ np.array([forces_at(replace(state, x=x)) for x in way])
+        path = [0.5 * ((1 - s) * before.x + (1 + s) * state.x) for s in _POINTS]
+        power = 0.5 * _WEIGHTS @ np.array([forces_at(replace(state, x=x)) for x in path])
     enthalpy = before.enthalpy + body.product(power, x - x_before) + gained
     mechanical = body.component_norms.mechanical
     # Mechanical work f.du; electric work phi dq, from the enthalpy's -q dphi.
     work = np.where(
         mechanical,
-        0.5 * (given + before.given) * (x - x_before),
-        -0.5 * (x + x_before) * (given - before.given),
+        0.5 * (external + before.external) * (x - x_before),
+        -0.5 * (x + x_before) * (external - before.external),
     )
     return Balance(
         work=body.product(work, np.ones_like(work)),
@@ -390,7 +390,7 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
         enthalpy=enthalpy,
         stated=stored or 0.0,
         x=state.x,
-        given=given,
+        external=external,
         internal=internal,
     )
 
@@ -403,5 +403,5 @@ def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> EvaluatedSt
     approaching a state without forces, none becomes small. With friction there may be other
     solutions, so a method asks for this where it fails.
     """
-    found = evaluate_state(problem, problem.start())
-    return found if found.residuals.significant <= tolerance else None
+    evaluated = evaluate_state(problem, problem.start())
+    return evaluated if evaluated.residuals.significant <= tolerance else None

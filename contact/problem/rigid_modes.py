@@ -88,8 +88,8 @@ class Group:
     def of_components(self, motions: Array) -> Array:
         """Return motions, shape (m, k), by components: (components, 1 to 6, k)."""
         each = 1 if self.problem.domain.revolved else 3 * (self.problem.dim - 1)
-        own = motions[: each * len(self.components)]
-        return own.reshape(len(self.components), each, motions.shape[1])
+        body_motions = motions[: each * len(self.components)]
+        return body_motions.reshape(len(self.components), each, motions.shape[1])
 
     def translation(self, motion: Array) -> float | None:
         """Return the amount of a motion (m,) that moves parts alike along one axis; else None."""
@@ -204,10 +204,10 @@ def _group(
     weight = contact.sum(np.ones_like(contact.weight))
     centres, centre = [], np.array([contact.sum(x) for x in contact.points.T]) / weight
     pieces = _pieces(problem) if moving else None
-    own_names, own_axes = NAMES[d], [*range(d), *[-1] * (len(NAMES[d]) - d)]
+    rigid_names, rigid_axes = NAMES[d], [*range(d), *[-1] * (len(NAMES[d]) - d)]
     if problem.domain.revolved:
-        own_names, own_axes = own_names[1:2], own_axes[1:2]
-    many = len(own_names) * len(components) + len(moving)
+        rigid_names, rigid_axes = rigid_names[1:2], rigid_axes[1:2]
+    many = len(rigid_names) * len(components) + len(moving)
     moved = np.zeros((body.owned + global_unknowns.size, many))
     motions = moved[: body.owned].reshape(*body.free.shape, many)
     at_cuts = np.zeros((0, d)) if pieces is None else pieces.points
@@ -217,14 +217,14 @@ def _group(
         side = np.zeros(0) if pieces is None else (pieces.above == k) * 1.0 - (pieces.below == k)
         if count > 1:
             centre, size = middle(problem, np.concatenate([points[inside], at_cuts[side != 0]]))
-        columns = slice(len(names), len(names) + len(own_names))
+        columns = slice(len(names), len(names) + len(rigid_names))
         rigid = rigid_motions((points[inside] - centre) / size, problem.domain.revolved)
         motions[inside, :d, columns] = rigid
         rigid = rigid_motions((at_cuts - centre) / size, problem.domain.revolved)
         joints[:, :, columns] = side[:, None, None] * rigid
         centres.append(centre)
-        names += own_names
-        axes += own_axes
+        names += rigid_names
+        axes += rigid_axes
     for k, (name, axis) in moving.items():
         moved[body.owned + k, len(names)] = 1.0
         if pieces is not None and k in pieces.places:
@@ -279,11 +279,11 @@ def mode_names(motions: Array, names: list[str]) -> str:
     """Name the modes that a space of rigid motions contains, else those that it combines."""
     share = np.linalg.norm(motions, axis=1)
     contained, combined = (
-        [*dict.fromkeys(name for name, own in zip(names, share, strict=True) if own > least)]
+        [*dict.fromkeys(name for name, weight in zip(names, share, strict=True) if weight > least)]
         for least in (1 - 1e-6, 1e-6)
     )
-    found = ", ".join(contained or combined)
-    return found if contained or len(combined) == 1 else f"a combination of {found}"
+    words = ", ".join(contained or combined)
+    return words if contained or len(combined) == 1 else f"a combination of {words}"
 
 
 def middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
@@ -407,22 +407,22 @@ class UnilateralSupport:
             bounds = [(-1, 1)] * work.size + [(0, None)] * yielding.shape[1]
             rows = [[rigid, None], *([each, -eye_array(each.shape[0])] for each in yielding)]
             cone = block_array(rows, format="csr")
-            found = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
-            if found.status != 0 or -found.fun <= BALANCED:
+            optimum = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
+            if optimum.status != 0 or -optimum.fun <= BALANCED:
                 return None
             resisted = np.zeros(bound.size)
-            resisted[finite] = bound[finite] * found.x[work.size :]
-            return found.x[: work.size], resisted
+            resisted[finite] = bound[finite] * optimum.x[work.size :]
+            return optimum.x[: work.size], resisted
 
-        # On rigid parts in place of the layers first: no larger limit helps there.
-        found = most_powerful(np.where(self.normal, np.inf, self.bound), 0.0)
-        saturated = found is None and bool(np.isfinite(self.bound[self.normal]).any())
+        # First with rigid parts in place of the layers: no larger limit helps against this mode.
+        released = most_powerful(np.where(self.normal, np.inf, self.bound), 0.0)
+        saturated = released is None and bool(np.isfinite(self.bound[self.normal]).any())
         if saturated:
             # With the whole layer at its limit the position of a body is undetermined.
-            found = most_powerful(self.bound, 2 * BALANCED)
-        if found is None:
+            released = most_powerful(self.bound, 2 * BALANCED)
+        if released is None:
             return None
-        motion, resisted = found
+        motion, resisted = released
         power = float(work @ motion)
         if saturated and resisted[self.normal].sum() <= BALANCED * power:
             return None
@@ -431,8 +431,8 @@ class UnilateralSupport:
 
 def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
     """Return the unilateral supports of all groups that need one. Collective."""
-    found = [UnilateralSupport.of(group) for group in groups(problem)]
-    return [support for support in found if support is not None]
+    supports = [UnilateralSupport.of(group) for group in groups(problem)]
+    return [support for support in supports if support is not None]
 
 
 def release_message(supports: Sequence[UnilateralSupport], begin: float, end: float) -> str:
@@ -442,15 +442,15 @@ def release_message(supports: Sequence[UnilateralSupport], begin: float, end: fl
     """
     earliest = None
     for support in supports:
-        low, found = begin, support.release(end)
-        if found is None:
+        low, release = begin, support.release(end)
+        if release is None:
             continue
         for _ in range(ROUNDS):
             half = (low + end) / 2
             before = support.release(half)
             low, end = (half, end) if before is None else (low, half)
-            found = before or found
-        earliest = found
+            release = before or release
+        earliest = release
     if earliest is None:
         return ""
     return f"from t = {end:g} on the loads {PUSHED_THROUGH if earliest.saturated else PULLED_OFF}"
@@ -473,14 +473,15 @@ def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
     if np.abs(work).max() <= NEGLIGIBLE * scale:
         return None
 
-    def found() -> Array | None:
+    def largest_mode() -> Array | None:
         bears = bound > NEGLIGIBLE * scale / bound.size
         along = [unit_vectors(of[bears]) for of in sideways]
-        each, own = (np.asarray(of / scale, dtype=float) for of in (work, bound[bears]))
-        mode = _most_power(each, normal, tangential[bears], own, along)
+        scaled_work = np.asarray(work / scale, dtype=float)
+        scaled_bound = np.asarray(bound[bears] / scale, dtype=float)
+        mode = _most_power(scaled_work, normal, tangential[bears], scaled_bound, along)
         return None if mode is None else np.asarray(free @ mode)
 
-    return on_root(problem.comm, found)
+    return on_root(problem.comm, largest_mode)
 
 
 def missing_pressure(group: Group, time: float, pressing: Array) -> float:
@@ -523,18 +524,18 @@ def _most_power(
         rows = [[normal, None], *([sign * of, -one] for of in slips for sign in (1, -1))]
         cone = block_array(rows, format="csr")
         cost = np.concatenate([-work, ratio * bound])
-        found = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
-        if found.status != 0 or -found.fun <= BALANCED:
+        optimum = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
+        if optimum.status != 0 or -optimum.fun <= BALANCED:
             break
-        worst = np.asarray(found.x[: work.size])
-        ways = tangential @ worst
-        power, dissipation = float(work @ worst), float(bound @ np.linalg.norm(ways, axis=1))
+        worst = np.asarray(optimum.x[: work.size])
+        slip = tangential @ worst
+        power, dissipation = float(work @ worst), float(bound @ np.linalg.norm(slip, axis=1))
         if power - ratio * dissipation > BALANCED:
             mode = worst
             if dissipation <= BALANCED * power:
                 break
             ratio = power / dissipation
-        along.append(unit_vectors(ways))
+        along.append(unit_vectors(slip))
     return mode
 
 
@@ -543,10 +544,10 @@ def _work(group: Group, free: Array, time: float) -> tuple[Array, float]:
     body, comm, moved = group.problem.body, group.problem.comm, group.moved
     loads = body.external(time)
     on_global = loads[body.owned :]
-    own = np.where(group.inside[:, None], body.nodal(loads), 0.0).ravel()
-    work = comm.allreduce(moved[: body.owned].T @ own, op=MPI.SUM)
+    group_loads = np.where(group.inside[:, None], body.nodal(loads), 0.0).ravel()
+    work = comm.allreduce(moved[: body.owned].T @ group_loads, op=MPI.SUM)
     work = (work + moved[body.owned :].T @ on_global) @ free
-    scale = comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM) + np.abs(on_global).sum()
+    scale = comm.allreduce(float(np.abs(group_loads).sum()), op=MPI.SUM) + np.abs(on_global).sum()
     return work, float(scale)
 
 

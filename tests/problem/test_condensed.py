@@ -89,7 +89,7 @@ def test_the_first_rank_alone_holds_the_dense_matrix_and_factors():
     assert (body.stiffness._solve is not None) == (WORLD.rank == 0)
     rhs = np.where(body.free.ravel(), 1.0, 0.0)
     found = np.concatenate(WORLD.allgather(operator.solve(rhs)))
-    own = body.rows @ found + np.where(rhs > 0, found[body.own], 0)
+    own = body.rows @ found + np.where(rhs > 0, found[body.local_rows], 0)
     assert np.allclose(own, rhs, rtol=0, atol=1e-9)
     assert body.stiffness.matrix.shape[0] == (found.size if WORLD.rank == 0 else 0)
 
