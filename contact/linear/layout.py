@@ -40,9 +40,9 @@ class Inclined:
     def along(self, values: Array) -> Array:
         """Return flat nodal values projected onto the fixed directions."""
         nodal = values.reshape(-1, self.across.shape[1])
-        found = np.zeros_like(nodal)
-        found[self.nodes] = np.einsum("nij,nj->ni", self.across, nodal[self.nodes])
-        return found.reshape(values.shape)
+        projected = np.zeros_like(nodal)
+        projected[self.nodes] = np.einsum("nij,nj->ni", self.across, nodal[self.nodes])
+        return projected.reshape(values.shape)
 
     def projection(self, layout: Layout) -> PETSc.Mat:
         """Return the projector onto the free directions, a matrix. Collective."""
@@ -51,14 +51,16 @@ class Inclined:
         grid = np.broadcast_arrays(rows[:, :, None], rows[:, None, :])
         square = (owned * size, owned * size)
         taken = sparse.coo_array((self.across.ravel(), [g.ravel() for g in grid]), shape=square)
-        own = sparse.csr_array(sparse.eye_array(owned * size) - taken)
-        own.sort_indices()
+        projector = sparse.csr_array(sparse.eye_array(owned * size) - taken)
+        projector.sort_indices()
         shape = ((owned * size, None), (owned * size, None))
         begin = layout.index_map.local_range[0] * size
-        parts = own.indptr.astype(PETSc.IntType), (own.indices + begin).astype(PETSc.IntType)
-        made = PETSc.Mat().createAIJ(shape, bsize=size, csr=(*parts, own.data), comm=layout.comm)
-        made.assemble()
-        return made
+        starts = projector.indptr.astype(PETSc.IntType)
+        columns = (projector.indices + begin).astype(PETSc.IntType)
+        csr = starts, columns, projector.data
+        matrix = PETSc.Mat().createAIJ(shape, bsize=size, csr=csr, comm=layout.comm)
+        matrix.assemble()
+        return matrix
 
     def add(self, matrix: PETSc.Mat, scale: float) -> None:
         """Add multiples of the projectors to a matrix. Collective."""
@@ -67,23 +69,23 @@ class Inclined:
 
 def masked(free: NDArray[np.bool_], inclined: Inclined | None, values: Array) -> Array:
     """Return flat nodal values, 0 at fixed unknowns and along fixed directions."""
-    own = np.where(free.ravel(), values, 0.0)
-    return own if inclined is None else own - inclined.along(own)
+    free_values = np.where(free.ravel(), values, 0.0)
+    return free_values if inclined is None else free_values - inclined.along(free_values)
 
 
 def projectors(free: NDArray[np.bool_], inclined: Inclined | None) -> Array:
     """Return the projectors onto the free directions of nodes, (n, block size, block size)."""
-    made = np.eye(free.shape[1]) * free[:, None, :]
+    matrices = np.eye(free.shape[1]) * free[:, None, :]
     if inclined is not None:
-        made[inclined.nodes] -= inclined.across
-    return made
+        matrices[inclined.nodes] -= inclined.across
+    return matrices
 
 
 def masked_blocks(free: NDArray[np.bool_], inclined: Inclined | None, blocks: Array) -> Array:
     """Return nodal blocks, 0 at fixed unknowns and along fixed directions."""
     if inclined is None:
-        own = free.astype(float)
-        return blocks * own[:, :, None] * own[:, None, :]
+        mask = free.astype(float)
+        return blocks * mask[:, :, None] * mask[:, None, :]
     along = projectors(free, inclined)
     return np.asarray(along @ blocks @ along)
 
@@ -144,10 +146,10 @@ class Layout:
     @property
     def restrained(self) -> NDArray[np.int32]:
         """Owned nodes with supports, ascending."""
-        some = np.asarray(~self.free.all(axis=1))
+        restrained = np.asarray(~self.free.all(axis=1))
         if self.inclined is not None:
-            some[self.inclined.nodes] = True
-        return np.flatnonzero(some).astype(np.int32)
+            restrained[self.inclined.nodes] = True
+        return np.flatnonzero(restrained).astype(np.int32)
 
     def mask(self, values: Array) -> Array:
         """Return owned values, 0 at fixed unknowns and along fixed directions."""
@@ -192,30 +194,30 @@ def set_defaults(prefix: str, values: Mapping[str, str]) -> None:
 @contextmanager
 def options(prefix: str, values: Mapping[str, str]) -> Iterator[None]:
     """Set options of PETSc under a prefix temporarily, where the user gives none."""
-    known = PETSc.Options(prefix)
-    own = [name for name in values if not known.hasName(name)]
+    database = PETSc.Options(prefix)
+    defaults = [name for name in values if not database.hasName(name)]
     set_defaults(prefix, values)
     try:
         yield
     finally:
-        for name in own:
-            known.delValue(name)
+        for name in defaults:
+            database.delValue(name)
 
 
 @contextmanager
 def hidden(prefix: str, names: Iterable[str]) -> Iterator[None]:
     """Hide options of the user under a prefix temporarily."""
-    known = PETSc.Options(prefix)
-    given = {name: known.getString(name) for name in names if known.hasName(name)}
-    for name in given:
-        known.delValue(name)
+    database = PETSc.Options(prefix)
+    user_options = {name: database.getString(name) for name in names if database.hasName(name)}
+    for name in user_options:
+        database.delValue(name)
     try:
         yield
     finally:
-        for name, value in given.items():
-            known[name] = value
+        for name, value in user_options.items():
+            database[name] = value
             # Mark it as read: PETSc warns of unread options.
-            known.hasName(name)
+            database.hasName(name)
 
 
 def balance(matrix: PETSc.Mat, layout: Layout) -> None:

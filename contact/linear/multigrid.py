@@ -53,15 +53,15 @@ def tentative(matrix: PETSc.Mat, prefix: str) -> PETSc.Mat | None:
     pc.setFromOptions()
     # GAMG takes the graph of such a matrix for symmetric, and deadlocks where an entry is rounding
     # and its transpose 0.
-    told = all(matrix.isSymmetricKnown())
-    if told:
+    symmetric = all(matrix.isSymmetricKnown())
+    if symmetric:
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, False)
     pc.setUp()
-    if told:
+    if symmetric:
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    found = pc.getMGInterpolation(1) if pc.getMGLevels() > 1 else None
+    interpolation = pc.getMGInterpolation(1) if pc.getMGLevels() > 1 else None
     pc.destroy()
-    return found
+    return interpolation
 
 
 class Aggregation:
@@ -85,10 +85,10 @@ class Aggregation:
         #: Lengths of the rows sent to other ranks.
         self._counts = np.diff(starts)[self._asked]
         sent = columns[_places(starts, self._asked)].astype(np.int64)
-        _, there = exchanged(self._comm, np.repeat(self._asking, self._counts), sent)
+        _, other_columns = exchanged(self._comm, np.repeat(self._asking, self._counts), sent)
         _, counts = exchanged(self._comm, self._asking, self._counts)
         low, high = (number // self._bs for number in self._range)
-        aside = [part[self._aside(part)] // self._bs for part in (columns, there)]
+        aside = [part[self._aside(part)] // self._bs for part in (columns, other_columns)]
         # Ascending, so that rows stay sorted.
         self._blocks = np.unique(np.concatenate([np.arange(low, high), *aside]))
         csr = starts, self._local(columns).astype(PETSc.IntType), values
@@ -97,13 +97,13 @@ class Aggregation:
             (starts.size - 1, self._width), csr, comm=PETSc.COMM_SELF
         )
         self.rows.setBlockSizes(matrix.getBlockSize(), self._bs)
-        pattern = np.append(0, np.cumsum(counts)), self._local(there)
+        pattern = np.append(0, np.cumsum(counts)), self._local(other_columns)
         #: Starts and columns of rows of P of other ranks.
         self._theirs = tuple(part.astype(PETSc.IntType) for part in pattern)
-        here = np.arange(*matrix.getOwnershipRange(), dtype=PETSc.IntType)
+        owned_rows = np.arange(*matrix.getOwnershipRange(), dtype=PETSc.IntType)
         blocks = self._blocks.astype(PETSc.IntType)
         self._map = PETSc.LGMap().create(blocks, bsize=self._bs, comm=matrix.comm)
-        maps = PETSc.LGMap().create(here, comm=matrix.comm), self._map
+        maps = PETSc.LGMap().create(owned_rows, comm=matrix.comm), self._map
         #: P as it multiplies vectors.
         self.interpolation = PETSc.Mat().createIS(sizes, None, *maps, matrix.comm)
         self.interpolation.setISLocalMat(self.rows)
@@ -132,11 +132,11 @@ class Aggregation:
         for rows in () if alone else np.array_split(np.arange(first, last), PARTS):
             chosen = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), self._comm)
             part = self._matrix.createSubMatrix(chosen, None)
-            starts, found, _ = part.getValuesCSR()
+            starts, numbers, _ = part.getValuesCSR()
             part.destroy()
             chosen.destroy()
-            beyond = (found < first) | (found >= last)
-            columns.append(np.unique(found[beyond]))
+            beyond = (numbers < first) | (numbers >= last)
+            columns.append(np.unique(numbers[beyond]))
             beside.append(rows[np.diff(np.append(0, np.cumsum(beyond))[starts]) > 0] - first)
         self._others, self._beside = np.unique(np.concatenate(columns)), np.concatenate(beside)
         owners = np.searchsorted(self._matrix.getOwnershipRanges()[1:], self._others, side="right")
@@ -152,11 +152,11 @@ class Aggregation:
         """Return the columns' numbers on this rank."""
         low, aside = self._range[0], self._aside(columns)
         before = np.searchsorted(self._blocks, low // self._bs) * self._bs
-        found = columns + columns.dtype.type(before - low)
+        local_columns = columns + columns.dtype.type(before - low)
         others = columns[aside]
         places = np.searchsorted(self._blocks, others // self._bs)
-        found[aside] = places * self._bs + others % self._bs
-        return found
+        local_columns[aside] = places * self._bs + others % self._bs
+        return local_columns
 
     def _chosen(self, rows: Integers) -> sparse.csr_array:
         """Return some of this rank's rows of P."""
@@ -177,25 +177,25 @@ class Aggregation:
         index = _index(self._beside + first), _index(self._others)
         beside = _scipy(*self._matrix.createSubMatrices(*index))
         for part in np.array_split(np.arange(self._beside.size), PARTS):
-            own = self._chosen(self._beside[part])
-            for factor in (own, beside, theirs) if pattern else ():
+            owned = self._chosen(self._beside[part])
+            for factor in (owned, beside, theirs) if pattern else ():
                 factor.data[:] = 1.0
-            yield sparse.csr_array(own.T @ (beside[part] @ theirs))
+            yield sparse.csr_array(owned.T @ (beside[part] @ theirs))
 
     def update(self) -> PETSc.Mat:
         """Return P^T K P of the present K and P. Collective."""
         # The option has other values for sequential matrices.
         with hidden("", ["matptap_via"]):
-            own = self._matrix.getDiagonalBlock().ptap(self.rows, result=self._product)
-        self._product = own
+            product = self._matrix.getDiagonalBlock().ptap(self.rows, result=self._product)
+        self._product = product
         if self._comm.size == 1:
-            self.coarse = own
+            self.coarse = product
         else:
             if self.coarse is None:
                 self.coarse = self._empty()
             self.coarse.zeroEntries()
             for rows in np.array_split(np.arange(self._width), PARTS):
-                self._add(rows, _scipy(rows_of(own, rows)))
+                self._add(rows, _scipy(rows_of(product, rows)))
             for part in self._thin():
                 self._add(np.arange(self._width), part)
             self.coarse.assemble()
@@ -217,28 +217,28 @@ class Aggregation:
         thin = sum(self._thin(pattern=True), sparse.csr_array((self._width, self._width)))
         thin.sort_indices()
         csr = thin.indptr.astype(PETSc.IntType), thin.indices.astype(PETSc.IntType), thin.data
-        own = PETSc.Mat().createAIJ(thin.shape, bsize=self._bs, csr=csr, comm=PETSc.COMM_SELF)
-        own.axpy(1.0, self._product)
+        local = PETSc.Mat().createAIJ(thin.shape, bsize=self._bs, csr=csr, comm=PETSc.COMM_SELF)
+        local.axpy(1.0, self._product)
         size = self._range[1] - self._range[0]
         whole = PETSc.Mat().createIS(
             ((size, None), (size, None)), self._bs, self._map, self._map, self._comm
         )
-        whole.setISLocalMat(own)
+        whole.setISLocalMat(local)
         whole.assemble()
         # Out of place.
-        made = whole.convert("aij", PETSc.Mat())
+        coarse = whole.convert("aij", PETSc.Mat())
         whole.destroy()
-        made.setLGMap(self._map, self._map)
-        return made
+        coarse.setLGMap(self._map, self._map)
+        return coarse
 
 
 def _restricted(modes: PETSc.NullSpace, tentative: PETSc.Mat) -> PETSc.NullSpace:
     """Return the near null space on the coarse level, by P0^T. Collective."""
-    found = []
+    restricted = []
     for mode in modes.getVecs():
-        found.append(tentative.createVecRight())
-        tentative.multTranspose(mode, found[-1])
-    return PETSc.NullSpace().create(vectors=found, comm=tentative.comm)
+        restricted.append(tentative.createVecRight())
+        tentative.multTranspose(mode, restricted[-1])
+    return PETSc.NullSpace().create(vectors=restricted, comm=tentative.comm)
 
 
 def _smoothed(
@@ -250,16 +250,16 @@ def _smoothed(
     """
     diagonal = matrix.getDiagonal()
     diagonal.reciprocal()
-    factor, made = -4 / (3 * _largest_eigenvalue(matrix)), tentative
+    factor, interpolation = -4 / (3 * _largest_eigenvalue(matrix)), tentative
     for _ in range(steps):
-        product = matrix.matMult(made)
+        product = matrix.matMult(interpolation)
         product.diagonalScale(L=diagonal)
-        product.aypx(factor, made, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        product.aypx(factor, interpolation, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         # Collective: Python would free it at different times on the ranks.
-        made.destroy()
-        made = product
-    rows = made.getValuesCSR()
-    for each in (made, diagonal):
+        interpolation.destroy()
+        interpolation = product
+    rows = interpolation.getValuesCSR()
+    for each in (interpolation, diagonal):
         each.destroy()
     return rows  # type: ignore[no-any-return]
 
@@ -276,10 +276,10 @@ def _largest_eigenvalue(matrix: PETSc.Mat) -> float:
     solution, rhs = matrix.createVecs()
     rhs.setRandom()
     ksp.solve(rhs, solution)
-    found = float(ksp.computeEigenvalues().real.max(initial=0.0))
+    eigenvalue = float(ksp.computeEigenvalues().real.max(initial=0.0))
     for each in (ksp, solution, rhs):
         each.destroy()
-    return found if found > 0 else np.inf
+    return eigenvalue if eigenvalue > 0 else np.inf
 
 
 def _places(starts: Integers, rows: Integers) -> Integers:
@@ -291,8 +291,8 @@ def _places(starts: Integers, rows: Integers) -> Integers:
 
 def rows_of(matrix: PETSc.Mat, rows: Integers) -> PETSc.Mat:
     """Return rows of a sequential matrix."""
-    every = PETSc.IS().createStride(matrix.getSize()[1], step=1, comm=PETSc.COMM_SELF)
-    return matrix.createSubMatrix(_index(rows), every)
+    columns = PETSc.IS().createStride(matrix.getSize()[1], step=1, comm=PETSc.COMM_SELF)
+    return matrix.createSubMatrix(_index(rows), columns)
 
 
 def _index(numbers: Integers) -> PETSc.IS:
@@ -434,10 +434,10 @@ class StiffNodes:
         of_body = rows_of(interpolation, self._rows)
         self._starts, self._columns, self._values = of_body.getValuesCSR()
 
-    def follow(self, own: Array, blocks: Array) -> None:
+    def follow(self, body_blocks: Array, blocks: Array) -> None:
         """Adapt the interpolation to blocks of body and contact, (n, bs, bs). Collective."""
         # The diagonal of K suffices.
-        root = np.sqrt(np.abs(np.einsum("nii->ni", own)))
+        root = np.sqrt(np.abs(np.einsum("nii->ni", body_blocks)))
         scaled = blocks / root[:, :, None] / root[:, None, :]
         # The solver refuses numbers that overflow.
         left, size, right = np.linalg.svd(np.where(np.isfinite(scaled), scaled, 0.0))
@@ -526,17 +526,21 @@ class Hierarchy:
         """Aggregate while ranks have many unknowns; GAMG makes the levels below. Collective."""
         pc, prefix = self._ksp.getPC(), self._ksp.getOptionsPrefix() or ""
         matrix = self._ksp.getOperators()[0]
-        known, kinds = PETSc.Options(prefix), ("pc_gamg_", "pc_mg_", "mg_")
+        database, kinds = PETSc.Options(prefix), ("pc_gamg_", "pc_mg_", "mg_")
         # Read one by one: PETSc warns of unread options.
-        named = {name: known.getString(name) for name in known.getAll() if name.startswith(kinds)}
+        named = {
+            name: database.getString(name) for name in database.getAll() if name.startswith(kinds)
+        }
         steps = int(named["pc_gamg_agg_nsmooths"])
         while named["pc_gamg_type"] == "agg":
-            own = {name: value for name, value in named.items() if name.startswith("pc_gamg_")}
-            with petsc_options(prefix), options(f"{prefix}aggregates_", own | AGGREGATES):
-                found = tentative(matrix, f"{prefix}aggregates_")
-            if found is None:
+            gamg_options = {
+                name: value for name, value in named.items() if name.startswith("pc_gamg_")
+            }
+            with petsc_options(prefix), options(f"{prefix}aggregates_", gamg_options | AGGREGATES):
+                interpolation = tentative(matrix, f"{prefix}aggregates_")
+            if interpolation is None:
                 break
-            self._levels.append(Aggregation(matrix, found, steps))
+            self._levels.append(Aggregation(matrix, interpolation, steps))
             _go_down(named)
             # GAMG leaves ranks without rows of small matrices.
             if self._levels[-1].interpolation.getSize()[1] <= LARGE[3, False] * matrix.comm.size:
@@ -556,9 +560,9 @@ class Hierarchy:
             pc.setMGInterpolation(k, level.interpolation)
         pc.getMGCoarseSolve().setOptionsPrefix(f"{prefix}coarse_")
 
-    def follow(self, own: Array, blocks: Array) -> bool:
+    def follow(self, body_blocks: Array, blocks: Array) -> bool:
         """Follow the operator, given blocks of body and contact; True if renewed. Collective."""
-        self._stiff.follow(own, blocks)
+        self._stiff.follow(body_blocks, blocks)
         if self._lost >= PRICE:
             self._renew()
             return True

@@ -272,24 +272,25 @@ class SparseOperator:
                 # Copies into a matrix drop its near null space.
                 self.matrix.setNearNullSpace(self._modes)
             balance(self.matrix, self.layout)
-            self._own = nodal_blocks(self.matrix, nodes)
-        rest, own = masked_blocks(*self.layout.at(nodes), blocks), self._own
+            self._body_blocks = nodal_blocks(self.matrix, nodes)
+        contact_blocks = masked_blocks(*self.layout.at(nodes), blocks)
+        body_blocks = self._body_blocks
         # An empty insertion would bump the matrix state and trigger a refactorisation.
-        inserts = same or not self._all(not rest.any())
+        inserts = same or not self._all(not contact_blocks.any())
         if self._multigrid and self._hierarchy is None:
             if inserts:
-                insert_blocks(self.matrix, nodes, own + TOUCH * rest)
+                insert_blocks(self.matrix, nodes, body_blocks + TOUCH * contact_blocks)
             self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self.ksp.setOperators(self.system, self.matrix)
             self._hierarchy = Hierarchy(self.ksp, nodes, self._subsystems)
         if inserts:
-            insert_blocks(self.matrix, nodes, own + rest)
+            insert_blocks(self.matrix, nodes, body_blocks + contact_blocks)
         if self._hierarchy is None:
             self._set_up(self.symmetric)
             self.counters.factorizations += 1
         else:
             self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
-            self.counters.factorizations += self._hierarchy.follow(own, rest)
+            self.counters.factorizations += self._hierarchy.follow(body_blocks, contact_blocks)
         return True
 
     @property
@@ -357,13 +358,13 @@ class SparseOperator:
 
     def solve_all(self, sides: Array) -> Array:
         """Solve for right-hand sides, (owned, k), as `solve`; counts as one solve. Collective."""
-        given = np.column_stack([self.layout.mask(side) for side in sides.T])
-        norm = float(np.sqrt(summed(self.layout.comm, np.sum(given**2))))
+        rhs = np.column_stack([self.layout.mask(side) for side in sides.T])
+        norm = float(np.sqrt(summed(self.layout.comm, np.sum(rhs**2))))
         if self.ksp.getPC().getFailedReason():
             raise self._fault(norm)
-        found = mat_solve(self.ksp, given)
-        self._solved(1, norm, float(np.sqrt(summed(self.layout.comm, np.sum(found**2)))))
-        return np.column_stack([self.layout.mask(x) for x in found.T])
+        solution = mat_solve(self.ksp, rhs)
+        self._solved(1, norm, float(np.sqrt(summed(self.layout.comm, np.sum(solution**2)))))
+        return np.column_stack([self.layout.mask(x) for x in solution.T])
 
     def _solved(self, iterations: int, rhs: float, solution: float) -> None:
         """Count a solve; raise InputError if it has failed. Collective."""

@@ -68,13 +68,13 @@ def set_up_with_workspace(
 def mat_solve(solver: PETSc.Mat | PETSc.KSP, sides: Array) -> Array:
     """Solve for several right-hand sides, shape (owned, k). Collective."""
     size = ((sides.shape[0], None), (None, sides.shape[1]))
-    given, solution = (PETSc.Mat().createDense(size, comm=solver.comm) for _ in "bx")
-    for matrix in (given, solution):
+    rhs, solution = (PETSc.Mat().createDense(size, comm=solver.comm) for _ in "bx")
+    for matrix in (rhs, solution):
         matrix.setUp()
-    given.getDenseArray()[:] = sides
-    given.assemble()
+    rhs.getDenseArray()[:] = sides
+    rhs.assemble()
     solution.assemble()
-    solver.matSolve(given, solution)
+    solver.matSolve(rhs, solution)
     return np.array(solution.getDenseArray())
 
 
@@ -175,13 +175,13 @@ def refine(
     component, count = subsystems or (np.zeros(0, dtype=np.intp), 1)
     matrix, asked_for = ksp.getOperators()[0], ksp.getTolerances()[0]
     allowed = asked_for**0.5 * norms(rhs)
-    left = rhs - matrix * solution
+    residual = rhs - matrix * solution
     for _ in range(CORRECTIONS):
-        before = norms(left)
+        before = norms(residual)
         beyond = before > allowed
         if not beyond.any():
             return
-        correction, asked = left.duplicate(), left.copy()
+        correction, asked = residual.duplicate(), residual.copy()
         if subsystems is not None:
             asked.array[~beyond[component]] = 0.0
         ksp.setInitialGuessNonzero(False)
@@ -192,12 +192,12 @@ def refine(
             solve(asked, correction)
         finally:
             ksp.setTolerances(rtol=asked_for)
-        corrected = left - matrix * correction
+        corrected = residual - matrix * correction
         gained = norms(corrected) < before
         if not np.any(gained & beyond):
             return
         if subsystems is not None:
             lost = ~gained[component]
-            correction.array[lost], corrected.array[lost] = 0.0, left.array_r[lost]
+            correction.array[lost], corrected.array[lost] = 0.0, residual.array_r[lost]
         solution.axpy(1.0, correction)
-        left = corrected
+        residual = corrected

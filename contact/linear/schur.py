@@ -65,18 +65,18 @@ class SchurComplement:
     def __init__(self, matrix: PETSc.Mat, retained: NDArray[np.int32], prefix: str) -> None:
         self._retained, self.comm = retained, _compat.lasting(matrix.getComm().tompi4py())
         begin, end = matrix.getOwnershipRange()
-        own_retained = (begin + retained).astype(PETSc.IntType)
+        retained_rows = (begin + retained).astype(PETSc.IntType)
         # MUMPS orders by minimum degree, with ties by the given order: backwards along the fronts
         # of dolfinx's numbering is cheapest.
         self._backwards = PETSc.IS().createStride(end - begin, end - 1, -1, comm=matrix.comm)
-        numbers = self.comm.allgather(begin + end - 1 - own_retained)
+        numbers = self.comm.allgather(begin + end - 1 - retained_rows)
         self.size = sum(part.size for part in numbers)
         self.offset = sum(part.size for part in numbers[: self.comm.rank])
         # The Schur complement is on the first rank.
-        own = np.concatenate(numbers)[: None if self.comm.rank == 0 else 0]
-        self._numbers = PETSc.IS().createGeneral(own, matrix.comm)
+        root_numbers = np.concatenate(numbers)[: None if self.comm.rank == 0 else 0]
+        self._numbers = PETSc.IS().createGeneral(root_numbers, matrix.comm)
         self._places = (
-            PETSc.IS().createGeneral(own_retained, matrix.comm),
+            PETSc.IS().createGeneral(retained_rows, matrix.comm),
             PETSc.IS().createStride(end - begin, begin, 1, comm=matrix.comm),
         )
         #: Rows at retained unknowns, and the matrix numbered backwards.
@@ -116,8 +116,8 @@ class SchurComplement:
         factor = self._ksp.getPC().getFactorMatrix()
         factor.setMumpsIcntl(*INTERIOR_SOLVE)
         size = self.size if self.comm.rank == 0 else 0
-        left = on_each(self.comm, lambda: _complement(factor, size))
-        return np.full_like(left, np.nan) if factor.getMumpsInfog(1) < 0 else left
+        complement = on_each(self.comm, lambda: _complement(factor, size))
+        return np.full_like(complement, np.nan) if factor.getMumpsInfog(1) < 0 else complement
 
     def _prepare(self, pc: PETSc.PC) -> None:
         """Tell MUMPS the retained unknowns before a factorisation."""
@@ -155,20 +155,20 @@ class SchurComplement:
         if interior is None and self.comm.size == 1:
             factor = self._ksp.getPC().getFactorMatrix()
             factor.setMumpsIcntl(*REDUCE)
-            reduced, given = factor.createVecs()
-            given.array[:] = rhs[::-1]
-            factor.solve(given, reduced)
+            reduced, reversed_rhs = factor.createVecs()
+            reversed_rhs.array[:] = rhs[::-1]
+            factor.solve(reversed_rhs, reduced)
             factor.setMumpsIcntl(*INTERIOR_SOLVE)
             return reduced.array[::-1][self._retained]
         interior = self.interior(rhs) if interior is None else interior
-        own = rhs[self._retained] - times(self._rows, interior)
-        return np.concatenate(self.comm.allgather(own))
+        condensed = rhs[self._retained] - times(self._rows, interior)
+        return np.concatenate(self.comm.allgather(condensed))
 
     def expand(self, rhs: Array, retained: Array) -> Array:
         """Return the owned solution from that at the retained unknowns of all ranks. Collective."""
-        own = retained[self.offset : self.offset + self._retained.size]
-        solution = self.interior(rhs - times(self._rows, own, transposed=True))
-        solution[self._retained] = own
+        owned = retained[self.offset : self.offset + self._retained.size]
+        solution = self.interior(rhs - times(self._rows, owned, transposed=True))
+        solution[self._retained] = owned
         return solution
 
 
@@ -291,9 +291,9 @@ class DenseOperator:
         """Factorise with blocks, the matrix being that of all kinds and states. Collective."""
         gathered = self._comm.gather(masked_blocks(self._free, self._inclined, blocks))
         self._blocks = np.concatenate(gathered or [blocks])
-        made = on_root(self._comm, lambda: self._stiffness.factorise(self._blocks))
-        self.counters.factorizations += made
-        return made
+        factorised = on_root(self._comm, lambda: self._stiffness.factorise(self._blocks))
+        self.counters.factorizations += factorised
+        return factorised
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns; see `operator.SparseOperator.solve`. Collective."""

@@ -70,30 +70,36 @@ class BasisChange:
         components of the node, and the mask of the free ones of this rank's nodes,
         (nodes, block size).
         """
-        made, free = unknowns
+        by_jumps, free = unknowns
         (count, size), entries = free.shape, sparse.coo_array(jumps)
-        known = halo.forward(free.astype(float)) > 0
+        free_in_halo = halo.forward(free.astype(float)) > 0
         at = rows[entries.row]
-        own = at == entries.col
+        on_diagonal = at == entries.col
         scale = np.ones((count, size))
-        scale[at[own]] = np.where(free[at[own]], entries.data[own, None], 1.0)
+        scale[at[on_diagonal]] = np.where(
+            free[at[on_diagonal]], entries.data[on_diagonal, None], 1.0
+        )
         # Unknowns of a replaced node by the free ones of other nodes.
-        blocks = entries.data[:, None, None] * made[entries.row] * known[entries.col][:, None, :]
-        entry, first, second = np.nonzero(np.where(own[:, None, None], 0.0, blocks))
+        blocks = (
+            entries.data[:, None, None]
+            * by_jumps[entries.row]
+            * free_in_halo[entries.col][:, None, :]
+        )
+        entry, first, second = np.nonzero(np.where(on_diagonal[:, None, None], 0.0, blocks))
         row, column = at[entry] * size + first, halo.numbers[entries.col[entry]] * size + second
         value = blocks[entry, first, second]
-        begin, here = halo.begin * size, np.arange(count * size)
+        begin, local_rows = halo.begin * size, np.arange(count * size)
         diagonal = scale.ravel()  # S, and -S^-1 R in `follows`
         follows = _matrix(comm, size, count, row, column, -value / diagonal[row])
         inverse = _matrix(
             comm,
             size,
             count,
-            np.concatenate([row, here]),
-            np.concatenate([column, here + begin]),
+            np.concatenate([row, local_rows]),
+            np.concatenate([column, local_rows + begin]),
             np.concatenate([value, diagonal]),
         )
-        whole = _matrix(comm, size, count, here, here + begin, np.ones(here.size))
+        whole = _matrix(comm, size, count, local_rows, local_rows + begin, np.ones(local_rows.size))
         further = follows
         while further.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] > 0:
             whole.axpy(1.0, further, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
@@ -119,9 +125,9 @@ def _matrix(
     csr.sort_indices()
     parts = (csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data)
     shape = (local, width)
-    made = PETSc.Mat().createAIJ((shape, shape), bsize=size, csr=parts, comm=comm)
-    made.assemble()
-    return made
+    matrix = PETSc.Mat().createAIJ((shape, shape), bsize=size, csr=parts, comm=comm)
+    matrix.assemble()
+    return matrix
 
 
 class Transformation:
@@ -159,14 +165,14 @@ class Transformation:
 
     def restrict(self, forces: Array) -> Array:
         """Return C^T f of forces on x. Collective."""
-        own = times(self.matrix, forces[: self.owned], transposed=True)
-        return np.concatenate([own, forces[self.owned :] + self.gathered(own)])
+        nodal = times(self.matrix, forces[: self.owned], transposed=True)
+        return np.concatenate([nodal, forces[self.owned :] + self.gathered(nodal)])
 
     def forces(self, restricted: Array) -> Array:
         """Return the forces on x of forces on y, 0 on fixed q. Collective."""
-        own = restricted[: self.owned]
-        q = np.where(self.free, restricted[self.owned :] - self.gathered(own), 0.0)
-        return np.concatenate([times(self._inverse, own, transposed=True), q])
+        nodal = restricted[: self.owned]
+        q = np.where(self.free, restricted[self.owned :] - self.gathered(nodal), 0.0)
+        return np.concatenate([times(self._inverse, nodal, transposed=True), q])
 
 
 class TransformedBulk:
@@ -196,13 +202,13 @@ class TransformedBulk:
 
     def create_matrix(self) -> PETSc.Mat:
         """Return a matrix with the pattern of Q^T K Q. Collective."""
-        made = self._bulk.create_matrix()
+        matrix = self._bulk.create_matrix()
         if self.transformation.matrix is None:
-            return made
-        self._plain = made
-        self._bulk.assemble(made, "secant", self._rest)
-        product = congruent(made, self.transformation.matrix)
-        product.setLGMap(*made.getLGMap())
+            return matrix
+        self._plain = matrix
+        self._bulk.assemble(matrix, "secant", self._rest)
+        product = congruent(matrix, self.transformation.matrix)
+        product.setLGMap(*matrix.getLGMap())
         return product
 
     def assemble(self, matrix: PETSc.Mat, kind: str, state: LinearisationPoint) -> None:
@@ -220,8 +226,8 @@ class TransformedBulk:
         border = self._bulk.border(kind)
         if border is not None:
             # Rows of tied nodes count by N_q alone.
-            own = [times(self.transformation.matrix, c, transposed=True) for c in border[0].T]
-            added = np.stack(own, axis=1)
+            columns = [times(self.transformation.matrix, c, transposed=True) for c in border[0].T]
+            added = np.stack(columns, axis=1)
             across = self.transformation.gathered(added)
             self.columns += added
             self.corner = self.corner + across + across.T + border[1]
@@ -296,26 +302,26 @@ class TransformedOperator:
         """Solve for the owned unknowns x and q; see `SparseOperator.solve`. Collective."""
         transformation, free = self._transformation, self._free
         restricted = transformation.restrict(rhs)
-        own, forces = restricted[: self._owned], restricted[self._owned :][free]
+        nodal, forces = restricted[: self._owned], restricted[self._owned :][free]
         columns = self._bulk.columns[:, free]
         if self._inner.iterative:
             if guess is not None:
                 guess = transformation.relative(guess)[: self._owned]
-            relative = self._inner.solve(own - columns @ (self._inverse @ forces), rtol, guess)
+            relative = self._inner.solve(nodal - columns @ (self._inverse @ forces), rtol, guess)
             moved = self._inverse @ (forces - self._on_q(columns, relative))
         elif free.size == 0:
-            relative, moved = self._inner.solve(own), forces
+            relative, moved = self._inner.solve(nodal), forces
         else:
             if self._bordered is None:
-                first, *responses = self._inner.solve_all(np.column_stack([own, columns])).T
+                first, *responses = self._inner.solve_all(np.column_stack([nodal, columns])).T
                 self._bordered = self._eliminated(columns, np.column_stack(responses))
             else:
-                first = self._inner.solve(own)
+                first = self._inner.solve(nodal)
             relative, moved = self._bordered.solve(first, forces)
         solution = self._expanded(relative, moved)
         if self._inner.iterative and rtol is not None and free.size:
-            left = rhs[self._owned :] - self.multiply(solution)[self._owned :]
-            solution[self._owned :][free] += self._compliance_of_q @ left[free]
+            residual = rhs[self._owned :] - self.multiply(solution)[self._owned :]
+            solution[self._owned :][free] += self._compliance_of_q @ residual[free]
         return solution
 
     def multiply(self, values: Array, transposed: bool = False) -> Array:
@@ -325,20 +331,22 @@ class TransformedOperator:
         """
         bulk, layout = self._bulk, self._bulk.layout
         relative = self._transformation.relative(values)
-        own, q = relative[: self._owned], relative[self._owned :]
+        nodal, q = relative[: self._owned], relative[self._owned :]
         if q.size == 0:
-            return self._transformation.forces(self._inner.multiply(own, transposed))
-        forces = layout.mask(self._inner.multiply(layout.mask(own), transposed) + bulk.columns @ q)
-        on_q = self._on_q(bulk.columns, own) + bulk.corner @ q
+            return self._transformation.forces(self._inner.multiply(nodal, transposed))
+        forces = layout.mask(
+            self._inner.multiply(layout.mask(nodal), transposed) + bulk.columns @ q
+        )
+        on_q = self._on_q(bulk.columns, nodal) + bulk.corner @ q
         return self._transformation.forces(np.concatenate([forces, on_q]))
 
     def solve_transposed(self, rhs: Array) -> Array:
         """Solve with the transposed operator; see `SparseOperator.solve_transposed`. Collective."""
         transformation, free = self._transformation, self._free
         restricted = transformation.restrict(rhs)
-        own, forces = restricted[: self._owned], restricted[self._owned :][free]
+        nodal, forces = restricted[: self._owned], restricted[self._owned :][free]
         columns = self._bulk.columns[:, free]
-        first = self._inner.solve_transposed(own)
+        first = self._inner.solve_transposed(nodal)
         solved = [self._inner.solve_transposed(columns[:, k]) for k in range(free.size)]
         responses = np.stack([*solved], axis=1) if solved else np.zeros_like(columns)
         return self._expanded(*self._eliminated(columns, responses).solve(first, forces))
@@ -403,9 +411,9 @@ class TransformedOperator:
         motions = bulk.layout.comm.allreduce(
             abs(self._transformation.motions[:, free]).sum(axis=0), op=MPI.SUM
         )
-        own = np.diag(bulk.corner)[free] > 0
-        jumps = np.diag((own & (np.asarray(motions).ravel() == 0)).astype(float))
-        every = (gram, parts, jumps)
-        gram = sum(part / max(np.abs(part).max(initial=0.0), 1e-300) for part in every)
+        stiff = np.diag(bulk.corner)[free] > 0
+        jumps = np.diag((stiff & (np.asarray(motions).ravel() == 0)).astype(float))
+        grams = (gram, parts, jumps)
+        gram = sum(part / max(np.abs(part).max(initial=0.0), 1e-300) for part in grams)
         resistance, directions = np.linalg.eigh(gram)
         return np.asarray(directions[:, resistance > ROUNDING * resistance.max(initial=0.0)])

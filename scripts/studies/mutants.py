@@ -115,8 +115,8 @@ MUTANTS = (
         "transformation-not-transposed",
         "C^T f, the forces on the jumps",
         "contact/linear/transformation.py",
-        "own = times(self.matrix, forces[: self.owned], transposed=True)",
-        "own = times(self.matrix, forces[: self.owned])",
+        "nodal = times(self.matrix, forces[: self.owned], transposed=True)",
+        "nodal = times(self.matrix, forces[: self.owned])",
         ("tests/verification/test_patch_two_bodies.py",),
     ),
     Mutant(
