@@ -166,19 +166,19 @@ class Assembly:
 
     def on_global(self, size: int, secant: bool = False) -> Array:
         """Return the internal forces on the global unknowns, shape (m,). Collective."""
-        found = np.zeros(size)
+        forces = np.zeros(size)
         if self._cuts is not None:
             forms = self._secant_section_forces if secant else self._section_forces
-            found[self._cuts.places] = [self._sum(own) for own in forms]
-        return found
+            forces[self._cuts.places] = [self._sum(terms) for terms in forms]
+        return forces
 
     def loads_on_global(self, time: float, size: int) -> Array:
         """Return the work of the loads at a time by unit shortenings, shape (m,). Collective."""
-        found = np.zeros(size)
+        work = np.zeros(size)
         if self._cuts is not None:
-            own = [loads.at(time)[0] for loads in self._section_loads]
-            found[self._cuts.places] = summed(self._domain.comm, own)
-        return found
+            local_work = [loads.at(time)[0] for loads in self._section_loads]
+            work[self._cuts.places] = summed(self._domain.comm, local_work)
+        return work
 
     def border(self, kind: str, owned: int, size: int) -> tuple[Array, Array] | None:
         """Return the derivatives by the m = `size` global unknowns; None without cuts. Collective.
@@ -189,17 +189,17 @@ class Assembly:
         if self._cuts is None:
             return None
         frozen = kind == "secant" or self._body.linear
-        own, across = self._secant_border if frozen else self._border
+        nodal_forms, cut_forms = self._secant_border if frozen else self._border
         columns, corner = np.zeros((owned, size)), np.zeros((size, size))
         for k, place in enumerate(self._cuts.places):
-            columns[:, place] = sum(assembled(form, owned) for form in own[k])
-            corner[self._cuts.places, place] = [self._sum(row[k]) for row in across]
+            columns[:, place] = sum(assembled(form, owned) for form in nodal_forms[k])
+            corner[self._cuts.places, place] = [self._sum(row[k]) for row in cut_forms]
         return columns, corner
 
     def _sum(self, forms: list[fem.Form]) -> float:
         """Return the sum of functionals over all ranks. Collective."""
-        own = sum(fem.assemble_scalar(form) for form in forms)
-        return float(lasting(self._domain.mesh.comm).allreduce(own, op=MPI.SUM))
+        local_sum = sum(fem.assemble_scalar(form) for form in forms)
+        return float(lasting(self._domain.mesh.comm).allreduce(local_sum, op=MPI.SUM))
 
     @property
     def _shortenings(self) -> list[Fields]:
@@ -233,7 +233,7 @@ class Assembly:
         """Compile the derivatives of forces on nodes, and across cuts, by each shortening."""
         cuts = self._cuts
         assert cuts is not None
-        own, *across = (
+        nodal_forms, *cut_forms = (
             [
                 _compiled([ufl.derivative(form, cuts.jump, direction) for form in forces])
                 for direction in cuts.directions
@@ -241,7 +241,7 @@ class Assembly:
             for z in (self._test, *self._shortenings)
             for forces in [self._forces(z, secant_at, secant_at)]
         )
-        return own, across
+        return nodal_forms, cut_forms
 
 
 def _compiled(forms: Sequence[ufl.Form]) -> list[fem.Form]:

@@ -79,9 +79,9 @@ class Body:
     ) -> None:
         if isinstance(law, Material | list | tuple):
             accepted = "a law, Material(law), or a list of Material(law, on=region)"
-            given = several("law", law, Material, accepted)
-            expect("law", law, accepted, given and piezo is None and not regions)
-            (law, piezo), regions = _leading(given), given
+            materials = several("law", law, Material, accepted)
+            expect("law", law, accepted, materials and piezo is None and not regions)
+            (law, piezo), regions = _leading(materials), materials
         fill(self, law=law, piezo=piezo)
         Material(self.law, self.piezo)
         for name, every, kind in (
@@ -117,10 +117,10 @@ class Body:
 
     def in_space(self, dim: int) -> Body:
         """Return the body with the laws of its materials in its axes, in 2-D or 3-D."""
-        given: Any = tuple(material.in_body(dim) for material in self.regions)
-        if all(one is own for one, own in zip(given, self.regions, strict=True)):
+        materials: Any = tuple(material.in_body(dim) for material in self.regions)
+        if all(one is region for one, region in zip(materials, self.regions, strict=True)):
             return self
-        return replace(self, law=given, piezo=None, regions=())
+        return replace(self, law=materials, piezo=None, regions=())
 
     @property
     def linear(self) -> bool:

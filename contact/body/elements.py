@@ -135,8 +135,8 @@ def _multilinear_mean(domain: Domain, kinematics: Kinematics) -> MultilinearMean
         functions = shape.lagrange(1, at)
         mean[..., 0] += (extent / (of[..., 0] @ functions.T)) @ functions
     mean /= extent.sum(axis=1)[:, None, None]
-    ways = corners - corners[:, None]
-    along = np.array([ways[..., axes].prod(axis=-1) for axes in axes_of(domain.dim)])
+    edges = corners - corners[:, None]
+    along = np.array([edges[..., axes].prod(axis=-1) for axes in axes_of(domain.dim)])
     return MultilinearMean(
         kinematics,
         _in_cells(domain, jacobians(shape, of, corners)),
@@ -147,10 +147,10 @@ def _multilinear_mean(domain: Domain, kinematics: Kinematics) -> MultilinearMean
 def _in_cells(domain: Domain, values: Array) -> fem.Function:
     """Return the multilinear function of corner values (cells, corners, ...). Collective."""
     space = fem.functionspace(domain.mesh, ("DG", 1, values.shape[2:]))
-    made, dofs = fem.Function(space), space.dofmap.list[: len(values)]
-    made.x.array.reshape(-1, space.dofmap.index_map_bs)[dofs] = values.reshape(*dofs.shape, -1)
-    made.x.scatter_forward()
-    return made
+    function, dofs = fem.Function(space), space.dofmap.list[: len(values)]
+    function.x.array.reshape(-1, space.dofmap.index_map_bs)[dofs] = values.reshape(*dofs.shape, -1)
+    function.x.scatter_forward()
+    return function
 
 
 def in_chunks(cells: NDArray[np.integer[Any]]) -> list[NDArray[Any]]:
@@ -164,7 +164,7 @@ class Pointwise:
     def __init__(self, space: fem.FunctionSpace) -> None:
         self._space = space
         self._at: fem.Function | None = None
-        self._made: dict[Hashable, fem.Expression] = {}
+        self._compiled: dict[Hashable, fem.Expression] = {}
         #: The last caller, whose unknowns are in the function.
         self._reader = object()
 
@@ -183,11 +183,11 @@ class Pointwise:
         numbers; of the local unknowns x the global ones are ignored.
         """
         at = self._at = self._at or fem.Function(self._space)
-        if name not in self._made:
-            self._made[name] = fem.Expression(expression(at), points)
-        made, reader = self._made[name], object()
+        if name not in self._compiled:
+            self._compiled[name] = fem.Expression(expression(at), points)
+        compiled, reader = self._compiled[name], object()
         for chosen in in_chunks(cells):
             if self._reader is not reader:
                 self._reader, at.x.array[:] = reader, x[: at.x.array.size]
-            found = np.asarray(made.eval(self._space.mesh, chosen))
-            yield chosen, found.reshape(chosen.size, len(points), made.value_size)
+            vectors = np.asarray(compiled.eval(self._space.mesh, chosen))
+            yield chosen, vectors.reshape(chosen.size, len(points), compiled.value_size)

@@ -108,13 +108,13 @@ class ComponentNorms:
 
     def _by_component(self, values: Array) -> Array:
         owned = values.size - self.behind.size
-        own, other = values[:owned], values[owned:]
+        nodal, on_global = values[:owned], values[owned:]
         if self.count == 1:
-            square = summed(self.comm, np.dot(own, own)) + np.dot(other, other)
+            square = summed(self.comm, np.dot(nodal, nodal)) + np.dot(on_global, on_global)
             return np.array([np.sqrt(square)])
         component = np.repeat(self.component, self.block_size)
-        squares = component_sums(self.comm, component, own**2, self.count)
-        return np.sqrt(squares + np.bincount(self.behind, other**2, minlength=self.count))
+        squares = component_sums(self.comm, component, nodal**2, self.count)
+        return np.sqrt(squares + np.bincount(self.behind, on_global**2, minlength=self.count))
 
     def spread(self, norms: Array) -> Array:
         """Return for each owned value the norm of its kind and component."""
@@ -177,8 +177,8 @@ class BodyEquilibrium:
         self.space = fem.functionspace(domain.mesh, ("Lagrange", degree, (self.block_size,)))
         #: The owned cells of each material.
         self.cells = cells_of(domain, body.materials)
-        for material, own in zip(body.materials, self.cells, strict=True):
-            factor_of(domain, material, own)
+        for material, cells in zip(body.materials, self.cells, strict=True):
+            factor_of(domain, material, cells)
         self.pointwise = Pointwise(self.space)
         self.supports = supports_of(domain, self.space, body)
         coupled = [material.piezo is not None for material in body.materials]
@@ -218,9 +218,9 @@ class BodyEquilibrium:
         # Values that are no numbers, or contradict each other, are refused first of all.
         self.prescribe(self.zero_displacement())
         if self.cuts is not None:
-            every = np.arange(len(self.free), dtype=np.int32)
+            owned_nodes = np.arange(len(self.free), dtype=np.int32)
             free = projectors(self.unsupported, self.layout.inclined)[:, : self.dim, : self.dim]
-            self.cuts.check(every, np.eye(self.dim) - free, "a support holds")
+            self.cuts.check(owned_nodes, np.eye(self.dim) - free, "a support holds")
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -258,9 +258,9 @@ class BodyEquilibrium:
 
     def function(self, x: Array, name: str = "x") -> fem.Function:
         """Return local unknowns as a function in `space`."""
-        made = fem.Function(self.space, name=name)
-        made.x.array[:] = self.nodal(x).ravel()
-        return made
+        function = fem.Function(self.space, name=name)
+        function.x.array[:] = self.nodal(x).ravel()
+        return function
 
     def nodal(self, values: Array) -> Array:
         """Return the nodal part of local or owned values, shape (nodes, block size)."""
@@ -283,8 +283,8 @@ class BodyEquilibrium:
         at, q = self._at.x, self.global_unknowns.prescribe(self.motion(x), time)
         at.array[:] = self.nodal(x).ravel()
         if self.global_unknowns.tying:
-            own = at.array[: self.owned]
-            own[self.global_unknowns.tied.ravel()] = (self.global_unknowns.ties @ q)[
+            owned = at.array[: self.owned]
+            owned[self.global_unknowns.tied.ravel()] = (self.global_unknowns.ties @ q)[
                 self.global_unknowns.tied.ravel()
             ]
         for support in self.supports:
@@ -313,10 +313,9 @@ class BodyEquilibrium:
         """Return K^T w, owned values, with the tangent K without supports. Collective."""
         matrix = self.create_matrix()
         self.assemble(matrix, "tangent", state, constrained=False)
-        own = times(matrix, weights[: self.owned], transposed=True)
-        found = np.concatenate([own, np.zeros(self.global_unknowns.size)])
+        nodal = times(matrix, weights[: self.owned], transposed=True)
         matrix.destroy()
-        return found
+        return np.concatenate([nodal, np.zeros(self.global_unknowns.size)])
 
     def forces_without_history(self, state: LinearisationPoint) -> Array:
         """Return the owned nodal forces of all materials without internal variables. Collective."""
@@ -375,15 +374,19 @@ class BodyEquilibrium:
 
     def unbalanced(self, forces: Array) -> Array:
         """Return the residual on the free unknowns, that on tied nodes gathered. Collective."""
-        global_unknowns, own = self.global_unknowns, forces[: self.owned]
-        q = np.where(global_unknowns.free, self.motion(forces) + global_unknowns.gathered(own), 0.0)
-        return np.concatenate([self.layout.mask(own), q])
+        global_unknowns, nodal = self.global_unknowns, forces[: self.owned]
+        q = np.where(
+            global_unknowns.free, self.motion(forces) + global_unknowns.gathered(nodal), 0.0
+        )
+        return np.concatenate([self.layout.mask(nodal), q])
 
     def reactions(self, forces: Array) -> Array:
         """Return the reactions of supports and of given motions. Collective."""
-        global_unknowns, own = self.global_unknowns, forces[: self.owned]
-        q = np.where(global_unknowns.free, 0.0, self.motion(forces) + global_unknowns.gathered(own))
-        return np.concatenate([own - masked(self.unsupported, self.layout.inclined, own), q])
+        global_unknowns, nodal = self.global_unknowns, forces[: self.owned]
+        q = np.where(
+            global_unknowns.free, 0.0, self.motion(forces) + global_unknowns.gathered(nodal)
+        )
+        return np.concatenate([nodal - masked(self.unsupported, self.layout.inclined, nodal), q])
 
     @cached_property
     def _projection(self) -> PETSc.Mat:
@@ -456,8 +459,8 @@ class BodyEquilibrium:
 
     def product(self, one: Array, other: Array) -> float:
         """Return the inner product of owned values, global ones behind them. Collective."""
-        own, n = np.dot(one[: self.owned], other[: self.owned]), self.owned
-        return float(summed(self.comm, own) + np.dot(one[n:], other[n:]))
+        nodal, n = np.dot(one[: self.owned], other[: self.owned]), self.owned
+        return float(summed(self.comm, nodal) + np.dot(one[n:], other[n:]))
 
     def norms(self, values: Array) -> Array:
         """Return the norms of forces, and of charges, by component. Collective."""

@@ -75,15 +75,15 @@ class Member:
         """Mask of its unknowns without given values."""
         return np.array([value is None for value in self.description.values])
 
-    def given(self, time: float) -> Array:
+    def prescribed(self, time: float) -> Array:
         """Return the given values at a time, 0 for free unknowns."""
-        given = self.description
-        return numbers_at(given.values, given.amplitude, time) / self.units
+        description = self.description
+        return numbers_at(description.values, description.amplitude, time) / self.units
 
     def forces(self, time: float) -> Array:
         """Return the forces and moments, or the charge, on its free unknowns at a time."""
-        given = self.description
-        forces = numbers_at(given.forces, given.amplitude, time)
+        description = self.description
+        forces = numbers_at(description.forces, description.amplitude, time)
         return np.where(self.free, forces * self.units, 0.0)
 
     def motion(self, points: Array, block_size: int) -> Array:
@@ -131,7 +131,9 @@ class GlobalUnknowns:
     def mechanical(self) -> NDArray[np.bool_]:
         """Mask of the motions, shape (m,)."""
         moves = [not isinstance(m.description, Electrode) for m in self.members]
-        flags = [np.full(m.free.size, own) for m, own in zip(self.members, moves, strict=True)]
+        flags = [
+            np.full(m.free.size, moving) for m, moving in zip(self.members, moves, strict=True)
+        ]
         return np.concatenate([np.zeros(0, dtype=bool), *flags])
 
     @property
@@ -141,8 +143,8 @@ class GlobalUnknowns:
 
     def member(self, part: str) -> Member | None:
         """Return the moving foundation in front of a part; None where it is fixed."""
-        found = (m for m in self.members if m.foundation and m.description.on == part)
-        return next(found, None)
+        foundations = (m for m in self.members if m.foundation and m.description.on == part)
+        return next(foundations, None)
 
     def of_foundation(
         self, points: Array, block_size: int, part: str | None = None
@@ -153,16 +155,16 @@ class GlobalUnknowns:
         """
         if self.size == 0:
             return None
-        found = np.zeros((len(points), block_size, self.size))
+        motion = np.zeros((len(points), block_size, self.size))
         member = None if part is None else self.member(part)
         if member is not None:
-            found[:, :, member.columns] = member.motion(points, block_size)
-        return found
+            motion[:, :, member.columns] = member.motion(points, block_size)
+        return motion
 
     def prescribe(self, q: Array, time: float) -> Array:
         """Return q with the given values at a time."""
-        given = [member.given(time) for member in self.members]
-        return np.where(self.free, q, np.concatenate([np.zeros(0), *given]))
+        values = [member.prescribed(time) for member in self.members]
+        return np.where(self.free, q, np.concatenate([np.zeros(0), *values]))
 
     def forces(self, time: float) -> Array:
         """Return the forces and charges on the free ones at a time, shape (m,)."""
@@ -176,8 +178,8 @@ class GlobalUnknowns:
 
     def with_foundations(self, nodes: NDArray[np.int32], motion: Array) -> sparse.csr_array:
         """Return N_q at tied nodes, and as given, (n, b, m), at contact nodes, shape (owned, m)."""
-        there = _rows(nodes, motion, slice(0, self.size), self.ties.shape)
-        return (self.ties + there).tocsr()
+        contact_rows = _rows(nodes, motion, slice(0, self.size), self.ties.shape)
+        return (self.ties + contact_rows).tocsr()
 
 
 def make_global_unknowns(
@@ -190,13 +192,13 @@ def make_global_unknowns(
     """
     members: list[Member] = []
     described: list[Rigid | Electrode | Bolt] = [*body.rigid, *body.electrodes, *body.bolts]
-    for given in described:
-        if isinstance(given, Rigid):
-            given = _moving(given, domain)
+    for description in described:
+        if isinstance(description, Rigid):
+            description = _moving(description, domain)
         begin = members[-1].columns.stop if members else 0
-        scale = body.phi_scale if isinstance(given, Electrode) else domain.size
-        scale = 1.0 if isinstance(given, Bolt) else scale
-        members.append(Member(given, begin, scale))
+        scale = body.phi_scale if isinstance(description, Electrode) else domain.size
+        scale = 1.0 if isinstance(description, Bolt) else scale
+        members.append(Member(description, begin, scale))
     size = members[-1].columns.stop if members else 0
     unknown = np.concatenate([np.zeros(0, dtype=bool), *(member.free for member in members)])
     tied = np.zeros(free.shape, dtype=bool)
@@ -211,10 +213,10 @@ def _moving(rigid: Rigid, domain: Domain) -> Rigid:
     """Return a rigid part with all components of its motion, checked for the dimension."""
     place = f"{rigid.name} on {rigid.on!r}: "
     for key in ("displacement", "force", "centre"):
-        given = getattr(rigid, key)
-        if given is not None and len(given) != domain.dim:
+        vector = getattr(rigid, key)
+        if vector is not None and len(vector) != domain.dim:
             raise InputError(
-                f"{place}{key} has {len(given)} components, the body has {domain.dim}",
+                f"{place}{key} has {len(vector)} components, the body has {domain.dim}",
                 "components",
             )
     try:
@@ -338,10 +340,10 @@ class Cuts:
         whole = fem.functionspace(domain.mesh, ("DG", degree, (domain.dim,)))
         self.places, self._comm = list(places), domain.comm
         self.parts = [bolt.on for bolt in body.bolts]
-        found = [_direction(domain, space, whole, part) for part in self.parts]
-        self.directions = [direction for direction, _, _, _ in found]
-        self._ends = [(nodes, normal) for _, nodes, normal, _ in found]
-        self._space, self._moved = space, [moved for _, _, _, moved in found]
+        cuts = [_direction(domain, space, whole, part) for part in self.parts]
+        self.directions = [direction for direction, _, _, _ in cuts]
+        self._ends = [(nodes, normal) for _, nodes, normal, _ in cuts]
+        self._space, self._moved = space, [moved for _, _, _, moved in cuts]
         self._free = [k for k, bolt in enumerate(body.bolts) if bolt.shortening is None]
         self.jump, self.secant_jump = fem.Function(whole), fem.Function(whole)
 
@@ -389,8 +391,9 @@ class Cuts:
         words on it for the message.
         """
         for part, (ends, normal) in zip(self.parts, self._ends, strict=True):
-            here = np.einsum("nik,i->nk", along[np.isin(nodes, ends)], normal)
-            if self._comm.allreduce(float(np.abs(here).max(initial=0.0)), op=MPI.MAX) > NEGLIGIBLE:
+            across = np.einsum("nik,i->nk", along[np.isin(nodes, ends)], normal)
+            largest = float(np.abs(across).max(initial=0.0))
+            if self._comm.allreduce(largest, op=MPI.MAX) > NEGLIGIBLE:
                 raise InputError(
                     f"bolt on {part!r}: {text} nodes of the cut along its normal; accepted: parts "
                     "that end a row of cells before the cut, or act along it",
@@ -434,10 +437,10 @@ def _direction(
     midpoints = compute_midpoints(mesh, d, count)[:, :d] if count.size else np.zeros((0, d))
     above = (midpoints - middle) @ normal > 0
     _check_through(domain, part, facets, touches.any(axis=1), above)
-    made, moved = fem.Function(whole), touches & above[:, None]
-    made.x.array.reshape(-1, d)[whole.dofmap.list[moved]] = -normal
-    own = np.flatnonzero(on_cut[: space.dofmap.index_map.size_local])
-    return made, own.astype(np.int32), normal, moved
+    direction, moved = fem.Function(whole), touches & above[:, None]
+    direction.x.array.reshape(-1, d)[whole.dofmap.list[moved]] = -normal
+    owned_nodes = np.flatnonzero(on_cut[: space.dofmap.index_map.size_local])
+    return direction, owned_nodes.astype(np.int32), normal, moved
 
 
 def _check_through(

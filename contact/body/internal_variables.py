@@ -67,15 +67,17 @@ def first_values(law: HistoryLaw, size: int) -> dict[str, Array]:
     """Return the variables in the reference configuration, with s = `size` components, checked."""
     place = f"{name_of(law)}: variables"
     with naming(place):
-        given = law.variables(size)
-        _returned(given, "a mapping of names to numbers, {} for none", isinstance(given, Mapping))
-    found = {}
-    for name, value in given.items():
+        variables = law.variables(size)
+        _returned(
+            variables, "a mapping of names to numbers, {} for none", isinstance(variables, Mapping)
+        )
+    arrays = {}
+    for name, value in variables.items():
         fits = isinstance(name, str) and name.isascii() and name.isidentifier()
         expect(f"{place}: the name", name, NAME, fits, "law-variables")
         with naming(f"{place}: {name!r}"):
-            found[name] = real(value, np.shape(value), "a real number, or an array of them")
-    return found
+            arrays[name] = real(value, np.shape(value), "a real number, or an array of them")
+    return arrays
 
 
 def respond(
@@ -87,29 +89,31 @@ def respond(
 ) -> Response:
     """Return `HistoryLaw.respond` of a law at n points, with the stiffness of `kind`."""
     with naming(f"{name_of(law)}: respond"):
-        found = law.respond(strain, variables, kind)
+        response = law.respond(strain, variables, kind)
         if check:
-            _check_response(found, strain, variables)
-        return with_stiffness(law, strain, variables, kind, found)
+            _check_response(response, strain, variables)
+        return with_stiffness(law, strain, variables, kind, response)
 
 
-def _returned(given: object, accepted: str, fits: bool, part: str = "") -> None:
+def _returned(returned: object, accepted: str, fits: bool, part: str = "") -> None:
     """Refuse a returned value unless it fits, inside `naming`."""
     if not fits:
-        raise Returned(f"{part}the function returns {shorten(repr(given))}; accepted: {accepted}")
+        raise Returned(
+            f"{part}the function returns {shorten(repr(returned))}; accepted: {accepted}"
+        )
 
 
-def _check_response(found: object, strain: Array, variables: Mapping[str, Array]) -> None:
+def _check_response(response: object, strain: Array, variables: Mapping[str, Array]) -> None:
     """Refuse all but a response with the same variables, and real arrays of n rows."""
     n, size = strain.shape
-    _returned(found, "a Response(stress, variables, ...)", isinstance(found, Response))
-    assert isinstance(found, Response)
-    given = [*found.variables] if isinstance(found.variables, Mapping) else found.variables
-    fits = isinstance(given, list) and {*given} == variables.keys()
-    _returned(given, f"a mapping with the names {[*variables]}", fits, "variables: ")
+    _returned(response, "a Response(stress, variables, ...)", isinstance(response, Response))
+    assert isinstance(response, Response)
+    names = [*response.variables] if isinstance(response.variables, Mapping) else response.variables
+    fits = isinstance(names, list) and {*names} == variables.keys()
+    _returned(names, f"a mapping with the names {[*variables]}", fits, "variables: ")
     shapes = {"stress": (n, size), "stiffness": (n, size, size)} | dict.fromkeys(ENERGIES, (n,))
-    parts = [(name, getattr(found, name), shape) for name, shape in shapes.items()]
-    parts += [(repr(name), found.variables[name], had.shape) for name, had in variables.items()]
+    parts = [(name, getattr(response, name), shape) for name, shape in shapes.items()]
+    parts += [(repr(name), response.variables[name], had.shape) for name, had in variables.items()]
     for name, value, shape in parts:
         if value is None and name in OPTIONAL:
             continue
@@ -126,10 +130,10 @@ def check_law(law: HistoryLaw, size: int, comm: MPI.Intracomm) -> None:
     law = law.base if isinstance(law, PlaneStressHistory) else law
     with on_all_ranks(comm):
         first = first_values(law, size)
-    every = comm.allgather([(name, value.shape) for name, value in first.items()])
+    by_rank = comm.allgather([(name, value.shape) for name, value in first.items()])
     words = "the same names and shapes on all ranks"
-    fits = all(each == every[0] for each in every)
-    expect(f"{name_of(law)}: variables", every, words, fits, "law-variables")
+    fits = all(each == by_rank[0] for each in by_rank)
+    expect(f"{name_of(law)}: variables", by_rank, words, fits, "law-variables")
     small = [way * SAMPLES[k] * np.eye(size) for way in (1, -1) for k in (0, 12)]
     strain = np.concatenate([np.zeros((1, size)), *small])
     variables = {
@@ -137,9 +141,9 @@ def check_law(law: HistoryLaw, size: int, comm: MPI.Intracomm) -> None:
     }
     with on_all_ranks(comm), np.errstate(all="ignore"):
         for kind in ("", "tangent", "secant"):
-            found = respond(law, strain, variables, kind, check=True)
+            response = respond(law, strain, variables, kind, check=True)
             for name in ("stress", *OPTIONAL):
-                if (values := getattr(found, name)) is not None:
+                if (values := getattr(response, name)) is not None:
                     with naming(f"{name_of(law)}: respond: {name}"):
                         rows = values.reshape(len(strain), -1).sum(axis=1)
                         check_finite(rows, lambda i: f"at the strain {strain[i].tolist()}")
@@ -168,7 +172,7 @@ class QuadratureLaws:
         self.kinematics = kinematics
         self._size, self._fitted = components(domain.dim), fitted
         pairs = zip((material.law for material in materials), cells, strict=True)
-        self._laws = [(law, own) for law, own in pairs if isinstance(law, HistoryLaw)]
+        self._laws = [(law, law_cells) for law, law_cells in pairs if isinstance(law, HistoryLaw)]
         mesh = domain.mesh
         self._owned = mesh.topology.index_map(mesh.topology.dim).size_local
         for law, _ in self._laws:
@@ -182,7 +186,7 @@ class QuadratureLaws:
     def _first_values(self) -> dict[str, Array]:
         """Return the variables in the reference configuration, by cell and point."""
         values: dict[str, Array] = {}
-        for law, own in self._laws:
+        for law, cells in self._laws:
             for name, value in law.variables(self._size).items():
                 first = np.asarray(value, dtype=float)
                 if name not in values:
@@ -193,7 +197,7 @@ class QuadratureLaws:
                         f"and {first.shape} in two materials; accepted: one, or two names",
                         "law-variables",
                     )
-                values[name][own] = first
+                values[name][cells] = first
         return {name: array.reshape(-1, *array.shape[2:]) for name, array in values.items()}
 
     def _function(self, *shape: int) -> fem.Function:
@@ -263,22 +267,22 @@ class QuadratureLaws:
     ) -> Iterator[tuple[Indices, Response]]:
         """Yield chunks of cells and the response, with "tangent", "symmetric" part or "secant"."""
         for law, cells, strains, variables in self._points(state, state.x):
-            found = respond(law, strains, variables, "tangent" if kind == "symmetric" else kind)
-            yield cells, found.symmetrised() if kind == "symmetric" else found
+            response = respond(law, strains, variables, "tangent" if kind == "symmetric" else kind)
+            yield cells, response.symmetrised() if kind == "symmetric" else response
 
     def _points(
         self, state: LinearisationPoint, x: Array
     ) -> Iterator[tuple[HistoryLaw, Indices, Array, dict[str, Array]]]:
         """Yield a law, a chunk of cells, strains of x and the variables before at their points."""
         before = self.of(state)
-        for law, own in self._laws:
+        for law, law_cells in self._laws:
             assert before is not None
-            values = self._pointwise.values("strain", self._strain, self.points, x, own)
-            for cells, found in values:
+            values = self._pointwise.values("strain", self._strain, self.points, x, law_cells)
+            for cells, strains in values:
                 if cells.size == 0:  # a rank may have no cells of a law
                     continue
                 variables = self._at(before.arrays, law, cells)
-                yield law, cells, found.reshape(-1, self._size), variables
+                yield law, cells, strains.reshape(-1, self._size), variables
 
     def _at(self, arrays: Mapping[str, Array], law: HistoryLaw, cells: Indices) -> dict[str, Array]:
         """Return the variables of a law at the points of some cells."""
@@ -287,11 +291,11 @@ class QuadratureLaws:
     def _in(self, cells: Indices, array: Array) -> Array:
         """Return values at the points of ascending cells, without a copy if these are all."""
         if cells.size == self._owned:
-            found = array.view()
+            values = array.view()
         else:
-            found = self.by_cell(array)[cells].reshape(-1, *array.shape[1:])
-        found.flags.writeable = False  # a user's law cannot change the history
-        return found
+            values = self.by_cell(array)[cells].reshape(-1, *array.shape[1:])
+        values.flags.writeable = False  # a user's law cannot change the history
+        return values
 
     def by_cell(self, array: Array) -> Array:
         """Return values by place as those by cell and point."""
@@ -299,9 +303,9 @@ class QuadratureLaws:
 
     def _put(self, into: dict[str, Array], cells: Indices, values: Mapping[str, Array]) -> None:
         """Write values of variables at the points of some cells."""
-        for name, found in values.items():
+        for name, value in values.items():
             by_cell = self.by_cell(into[name])
-            by_cell[cells] = found.reshape(by_cell[cells].shape)
+            by_cell[cells] = value.reshape(by_cell[cells].shape)
 
     @collective
     def set(self, state: LinearisationPoint, kind: str = "") -> None:
@@ -349,8 +353,8 @@ class QuadratureLaws:
     ) -> InternalVariables:
         """Return the differential of `commit`, by unknowns and variables before. Collective."""
         arrays = {name: np.zeros_like(array) for name, array in change.arrays.items()}
-        for cells, found in self._differentials(state, along, change):
-            self._put(arrays, cells, found.variables)
+        for cells, response in self._differentials(state, along, change):
+            self._put(arrays, cells, response.variables)
         return change.replaced(arrays)
 
     @collective
@@ -358,8 +362,8 @@ class QuadratureLaws:
         """Set stresses to their differential by the variables before a step. Collective."""
         self._seen = None
         self._stress.x.array[:] = 0.0
-        for cells, found in self._differentials(state, np.zeros_like(state.x), change):
-            _fill(self._stress, cells, found.stress)
+        for cells, response in self._differentials(state, np.zeros_like(state.x), change):
+            _fill(self._stress, cells, response.stress)
 
     @collective
     def commit_transposed(self, state: LinearisationPoint, after: InternalVariables) -> None:
@@ -371,8 +375,8 @@ class QuadratureLaws:
         self._stress.x.array[:] = 0.0
         volumes = self.by_cell(self.volumes)
         for law, cells, strains, variables in self._points(state, state.x):
-            given = self._at(after.arrays, law, cells)
-            by_strain = _gradient(law, strains, variables, given, OF_STRAIN)
+            weights = self._at(after.arrays, law, cells)
+            by_strain = _gradient(law, strains, variables, weights, OF_STRAIN)
             volume = volumes[cells].ravel()
             _fill(self._stress, cells, by_strain / volume[:, None])
 
@@ -393,10 +397,10 @@ class QuadratureLaws:
         for (law, cells, strains, variables), (_, _, by_stress, _) in zip(
             self._points(state, state.x), moved, strict=True
         ):
-            given = {} if after is None else self._at(after.arrays, law, cells)
+            weights = {} if after is None else self._at(after.arrays, law, cells)
             volume = volumes[cells].ravel()
-            given[OF_STRAIN] = volume[:, None] * by_stress
-            points = law, strains, variables, given
+            weights[OF_STRAIN] = volume[:, None] * by_stress
+            points = law, strains, variables, weights
             self._put(arrays, cells, {name: _gradient(*points, name) for name in variables})
         return before.replaced(arrays)
 
@@ -465,11 +469,11 @@ class QuadratureLaws:
     @collective
     def secant_shear(self, state: LinearisationPoint) -> Array:
         """Return the mean secant shear moduli of owned cells, 0 without history. Collective."""
-        found = np.zeros(self._owned)
+        moduli = np.zeros(self._owned)
         for cells, response in self._responses(state, "secant"):
             assert response.stiffness is not None
-            found[cells] = response.stiffness[:, -1, -1].reshape(cells.size, -1).mean(axis=1) / 2
-        return found
+            moduli[cells] = response.stiffness[:, -1, -1].reshape(cells.size, -1).mean(axis=1) / 2
+        return moduli
 
     @collective
     def fit(self, state: LinearisationPoint) -> None:
@@ -485,23 +489,25 @@ def _gradient(
     law: HistoryLaw,
     strain: Array,
     variables: Mapping[str, Array],
-    given: Mapping[str, Array],
+    weights: Mapping[str, Array],
     name: str,
 ) -> Array:
     """Return the derivative of a weighted sum of the response at each point.
 
-    `given` weighs the variables at the end and, under `OF_STRAIN`, the stress; the derivative is
-    by the variable `name` at the beginning, or the strain.
+    `weights` are those of the variables at the end and, under `OF_STRAIN`, of the stress; the
+    derivative is by the variable `name` at the beginning, or the strain.
     """
     still = {key: np.zeros_like(value) for key, value in (*variables.items(), (OF_STRAIN, strain))}
     slopes = np.zeros((len(strain), still[name][:1].size))
     for k in range(slopes.shape[1]):
         unit = np.zeros_like(slopes)
         unit[:, k] = 1.0
-        way = still | {name: unit.reshape(still[name].shape)}
-        found = differential(law, strain, variables, way.pop(OF_STRAIN), way)
-        ends = {**found.variables, OF_STRAIN: found.stress}
-        slopes[:, k] = np.sum([_dot(weight, ends[part]) for part, weight in given.items()], axis=0)
+        direction = still | {name: unit.reshape(still[name].shape)}
+        response = differential(law, strain, variables, direction.pop(OF_STRAIN), direction)
+        ends = {**response.variables, OF_STRAIN: response.stress}
+        slopes[:, k] = np.sum(
+            [_dot(weight, ends[part]) for part, weight in weights.items()], axis=0
+        )
     return slopes.reshape(still[name].shape)
 
 

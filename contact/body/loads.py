@@ -18,7 +18,7 @@ from ufl.corealg.traversal import traverse_unique_terminals
 
 from contact.arguments import check_finite, naming, real
 from contact.body.description import Body
-from contact.body.weak_form import Given, Term
+from contact.body.weak_form import LoadDensity, Term
 from contact.errors import InputError
 from contact.mesh.domain import Domain, compiled
 from contact.mesh.geometry import area
@@ -30,12 +30,14 @@ from contact.tolerances import HUGE
 from contact.typing import Array
 
 
-def given_loads(domain: Domain, body: Body, time: fem.Constant) -> Mapping[str, Sequence[Given]]:
+def given_loads(
+    domain: Domain, body: Body, time: fem.Constant
+) -> Mapping[str, Sequence[LoadDensity]]:
     """Return the loads of a body for its weak form, by their keys; in UFL at a time. Collective.
 
     Refuses missing parts, forces of the wrong length, and charges on a body without a potential.
     """
-    found: dict[str, list[Given]] = defaultdict(list)
+    loads: dict[str, list[LoadDensity]] = defaultdict(list)
     x = ufl.SpatialCoordinate(domain.mesh)
     for number, load in enumerate(body.loads):
         _check(domain, body, load, f"load.{number}")
@@ -45,7 +47,7 @@ def given_loads(domain: Domain, body: Body, time: fem.Constant) -> Mapping[str, 
             value = expression(domain, field, x, time, f"load.{number}.{name}")
             varies, (key, *component) = isinstance(field, Moving), name.split(".")
             if not component:
-                found[key].append(Given(value, over, load.on, load.factor, varies))
+                loads[key].append(LoadDensity(value, over, load.on, load.factor, varies))
                 continue
             none = [constant(domain.mesh, 0.0) for _ in range(domain.dim)]
             vectors.setdefault((key, varies), none)[int(component[0])] = value
@@ -54,8 +56,8 @@ def given_loads(domain: Domain, body: Body, time: fem.Constant) -> Mapping[str, 
             if key == "force":
                 assert load.on is not None
                 key, vector = "traction", vector / constant(domain.mesh, area(domain, load.on))
-            found[key].append(Given(vector, over, load.on, load.factor, varies))
-    return found
+            loads[key].append(LoadDensity(vector, over, load.on, load.factor, varies))
+    return loads
 
 
 def _check(domain: Domain, body: Body, load: Load, key: str) -> None:
@@ -147,19 +149,19 @@ def expression(
     A value that is no function on one rank is refused on all, with its key.
     """
     with on_all_ranks(domain.comm), naming(key):
-        found = at_time(value, time).ufl(x)
-        if not isinstance(found, Expr):
-            number = real(found, (), "a number, or UFL of one")
+        expr = at_time(value, time).ufl(x)
+        if not isinstance(expr, Expr):
+            number = real(expr, (), "a number, or UFL of one")
             check_finite(number.reshape(1), lambda _: "everywhere")
             return constant(domain.mesh, float(number))
-        real(np.zeros(found.ufl_shape), (), "UFL of a number")
-        for part in traverse_unique_terminals(found):
+        real(np.zeros(expr.ufl_shape), (), "UFL of a number")
+        for part in traverse_unique_terminals(expr):
             if isinstance(part, ScalarValue):
                 number = real(part.value(), (), "real UFL")
                 check_finite(number.reshape(1), lambda _: "everywhere")
-        if isinstance(found, ScalarValue | ufl.classes.Zero):
-            return constant(domain.mesh, float(found))
-        return found
+        if isinstance(expr, ScalarValue | ufl.classes.Zero):
+            return constant(domain.mesh, float(expr))
+        return expr
 
 
 def wrong_load(loads: Sequence[Load], domain: Domain, time: float) -> str:

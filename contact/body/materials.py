@@ -36,7 +36,7 @@ def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
     if len(materials) == 1 and not materials[0].on:
         return [np.arange(_count(domain), dtype=np.int32)]
     owner = np.full(_count(domain), -1, dtype=np.int32)
-    found = []
+    by_material = []
     for i, material in enumerate(materials):
         if not material.on:
             raise InputError(
@@ -45,8 +45,8 @@ def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
                 "missing",
             )
         cells = np.unique(np.concatenate([domain.cells(name) for name in material.on]))
-        both = owner[cells].max(initial=-1)
-        other = domain.comm.allreduce(int(both), op=MPI.MAX)
+        previous = owner[cells].max(initial=-1)
+        other = domain.comm.allreduce(int(previous), op=MPI.MAX)
         if other >= 0:
             raise InputError(
                 f"material.{i}.on: {', '.join(material.on)} shares cells with the regions of "
@@ -54,9 +54,9 @@ def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
                 "regions",
             )
         owner[cells] = i
-        found.append(cells.astype(np.int32))
+        by_material.append(cells.astype(np.int32))
     _check_all(domain, owner)
-    return found
+    return by_material
 
 
 def young_behind(
@@ -64,15 +64,17 @@ def young_behind(
 ) -> float:
     """Return the largest Young's modulus in the cells at a part. Collective."""
     behind, _ = cells_at(domain.mesh, domain.facets(on))
-    every = zip(materials, cells, strict=True)
-    found = [float(material.law.young) for material, own in every if np.isin(behind, own).any()]
-    return domain.comm.allreduce(max(found, default=0.0), op=MPI.MAX)
+    pairs = zip(materials, cells, strict=True)
+    moduli = [
+        float(material.law.young) for material, indices in pairs if np.isin(behind, indices).any()
+    ]
+    return domain.comm.allreduce(max(moduli, default=0.0), op=MPI.MAX)
 
 
 def _check_all(domain: Domain, owner: Indices) -> None:
     """Refuse cells without a material, by the name of their region."""
-    left = domain.comm.allreduce(int(np.count_nonzero(owner < 0)), op=MPI.SUM)
-    if left == 0:
+    unassigned = domain.comm.allreduce(int(np.count_nonzero(owner < 0)), op=MPI.SUM)
+    if unassigned == 0:
         return
     for name, cells in domain.regions.items():
         without = domain.comm.allreduce(int(np.count_nonzero(owner[cells] < 0)), op=MPI.SUM)
@@ -83,8 +85,8 @@ def _check_all(domain: Domain, owner: Indices) -> None:
                 "regions",
             )
     raise InputError(
-        f"material: {left} cells of the mesh are in no region and have none; accepted: a region "
-        "(physical group) for each cell, or one material without `on` for the whole mesh",
+        f"material: {unassigned} cells of the mesh are in no region and have none; accepted: a "
+        "region (physical group) for each cell, or one material without `on` for the whole mesh",
         "regions",
     )
 
@@ -106,12 +108,12 @@ def solids_of(
     the compiled form. Large bodies are divided, for dolfinx packs the values of each function in
     all cells of a form, far more values than unknowns.
     """
-    most = domain.comm.allreduce(max(own.size for own in cells), op=MPI.MAX)
-    parts = [np.array_split(own, most // (4 * CHUNK) + 1) for own in cells]
+    most = domain.comm.allreduce(max(indices.size for indices in cells), op=MPI.MAX)
+    parts = [np.array_split(indices, most // (4 * CHUNK) + 1) for indices in cells]
     solids = []
     for number, (degree, strains) in enumerate(rules):
         for part in zip(*parts, strict=True):
-            for material, own in zip(materials, part, strict=True):
+            for material, indices in zip(materials, part, strict=True):
                 piezo, seen = material.piezo, strains
                 if isinstance(material.law, HistoryLaw):
                     seen = ((1, laws.kinematics),)  # stresses at points are those of all strains
@@ -119,7 +121,7 @@ def solids_of(
                         continue
                 law = laws.law(form_law(material, domain.mesh))
                 constants = None if piezo is None else piezo_with_constants(piezo, domain.mesh)
-                dx = domain.dx_over(own)(metadata={"quadrature_degree": degree})
+                dx = domain.dx_over(indices)(metadata={"quadrature_degree": degree})
                 solids.append(Solid(law, constants, seen, dx))
     return solids
 

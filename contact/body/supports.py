@@ -56,10 +56,10 @@ class Support:
         """Set the values of the condition at a time. Collective where the field is."""
         if self.field is None:
             return
-        given = values_at(self.field, self.points, time, self.name, self.comm)
+        prescribed = values_at(self.field, self.points, time, self.name, self.comm)
         if self.check is not None:
-            self.check(given)
-        self.values.x.array[self.dofs] = given / self.scale
+            self.check(prescribed)
+        self.values.x.array[self.dofs] = prescribed / self.scale
 
     def set(self, into: Array, time: float) -> None:
         """Put the prescribed values at a time into local unknowns. Collective."""
@@ -108,7 +108,7 @@ def elastic_supports_of(domain: Domain, body: Body) -> list[ElasticSupport]:
 
     Refuses missing parts, and stiffnesses of the wrong length or negative somewhere.
     """
-    found, x = [], ufl.SpatialCoordinate(domain.mesh)
+    supports, x = [], ufl.SpatialCoordinate(domain.mesh)
     for number, support in enumerate(body.elastic):
         axes, on = support.stiffness or (), support.on
         if axes and len(axes) != domain.dim:
@@ -117,16 +117,18 @@ def elastic_supports_of(domain: Domain, body: Body) -> list[ElasticSupport]:
                 f"has {domain.dim}",
                 "elastic",
             )
-        given: dict[str, Field | Moving] = {f"stiffness.{i}": value for i, value in enumerate(axes)}
-        given["normal"] = Expression(0.0) if support.normal is None else support.normal
-        for key, value in given.items():
+        stiffness: dict[str, Field | Moving] = {
+            f"stiffness.{i}": value for i, value in enumerate(axes)
+        }
+        stiffness["normal"] = Expression(0.0) if support.normal is None else support.normal
+        for key, value in stiffness.items():
             _check_stiffness(domain, on, value, f"elastic.{number}.{key}")
         *along, normal = (
             expression(domain, value, x, 0.0, f"elastic.{number}.{key}")
-            for key, value in given.items()
+            for key, value in stiffness.items()
         )
-        found.append(ElasticSupport(along, normal, domain.ds(on)))
-    return found
+        supports.append(ElasticSupport(along, normal, domain.ds(on)))
+    return supports
 
 
 def _check_stiffness(domain: Domain, on: str, value: Any, key: str) -> None:
@@ -139,8 +141,8 @@ def _check_stiffness(domain: Domain, on: str, value: Any, key: str) -> None:
     with on_all_ranks(domain.comm), np.errstate(all="ignore"):
         values = np.asarray(value.numpy(points[:, : domain.dim]))
     wrong = ~(np.isfinite(values) & (values >= 0))
-    found = domain.comm.allgather(values[wrong][:1].tolist())
-    worst = [one for own in found for one in own]
+    by_rank = domain.comm.allgather(values[wrong][:1].tolist())
+    worst = [one for rank_values in by_rank for one in rank_values]
     if worst:
         raise InputError(
             f"{key}: given {worst[0]:g} on {on!r}; accepted: numbers >= 0 everywhere",
@@ -152,14 +154,14 @@ def _check_across(key: str, domain: Domain, on: str, axis: int) -> None:
     """Refuse a part outside a plane across an axis. Collective."""
     name = "xyz"[axis]
     if axis >= domain.dim or (domain.revolved and axis == 0):
-        known = "y" if domain.revolved else " or ".join("xyz"[: domain.dim])
-        raise InputError(f'{key}: given "{name}"; accepted: {known}', "value")
-    facets, there = domain.facets(on), np.zeros(0)
+        accepted = "y" if domain.revolved else " or ".join("xyz"[: domain.dim])
+        raise InputError(f'{key}: given "{name}"; accepted: {accepted}', "value")
+    facets, coordinates = domain.facets(on), np.zeros(0)
     if facets.size:  # which `entities_to_geometry` divides by
         nodes = entities_to_geometry(domain.mesh, domain.dim - 1, facets)
-        there = domain.mesh.geometry.x[nodes.ravel(), axis]
-    low = domain.comm.allreduce(float(there.min(initial=np.inf)), op=MPI.MIN)
-    high = domain.comm.allreduce(float(there.max(initial=-np.inf)), op=MPI.MAX)
+        coordinates = domain.mesh.geometry.x[nodes.ravel(), axis]
+    low = domain.comm.allreduce(float(coordinates.min(initial=np.inf)), op=MPI.MIN)
+    high = domain.comm.allreduce(float(coordinates.max(initial=-np.inf)), op=MPI.MAX)
     if high - low > 1e-6 * domain.size:
         raise InputError(
             f"{key}: {on} reaches from {name} = {low:.6g} to {high:.6g}; accepted: a part in a "
@@ -190,8 +192,8 @@ def _off_axis(domain: Domain, part: str, points: Array) -> Callable[[Array], Non
     inside = on_axis(domain, points)
 
     def check(radial: Array) -> None:
-        here = float(np.abs(radial[inside]).max(initial=0.0))
-        largest = domain.comm.allreduce(here, op=MPI.MAX)
+        local = float(np.abs(radial[inside]).max(initial=0.0))
+        largest = domain.comm.allreduce(local, op=MPI.MAX)
         if largest > 1e-12 * domain.size:
             raise InputError(
                 f"fixed on {part!r}: a radial displacement of {largest:.4g} where the part meets "
@@ -223,7 +225,7 @@ def _support(
     points = scalar.tabulate_dof_coordinates()[dofs[1], :dim]
     condition = fem.dirichletbc(data, dofs, subspace)
     check = _off_axis(domain, part, points) if domain.revolved and component == 0 else None
-    made = Support(
+    support = Support(
         condition,
         data,
         dofs[1],
@@ -235,8 +237,8 @@ def _support(
         name=name,
         check=check,
     )
-    made.evaluate(0.0)
-    return made
+    support.evaluate(0.0)
+    return support
 
 
 def without_field(space: fem.FunctionSpace, cells: NDArray[np.int32]) -> Support:
@@ -277,7 +279,7 @@ class Roller:
     amplitude: Factor  #: its factor as a function of time
     comm: MPI.Intracomm
 
-    def given(self, time: float) -> Array:
+    def prescribed(self, time: float) -> Array:
         """Return the displacements along the normal at a time, shape (n,). Collective."""
         name = f"fixed.{self.number}.normal"
         return self.amplitude(time) * values_at(self.field, self.points, time, name, self.comm)
@@ -300,13 +302,13 @@ def nodal_normals(
     sums = sums_at(space.dofmap.index_map, nodes, normal)
     length = np.linalg.norm(sums, axis=1, keepdims=True)
     mean = np.divide(sums, length, out=np.zeros_like(sums), where=length > 0)
-    own = normal / np.linalg.norm(normal, axis=2, keepdims=True)
-    cosine = np.einsum("fqd,fqd->fq", own, mean[nodes]).min(initial=1.0)
+    facet_normal = normal / np.linalg.norm(normal, axis=2, keepdims=True)
+    cosine = np.einsum("fqd,fqd->fq", facet_normal, mean[nodes]).min(initial=1.0)
     least = domain.comm.allreduce(float(cosine), op=MPI.MIN)
     domain.mesh.topology.create_connectivity(d - 1, d)
-    found = fem.locate_dofs_topological(space, d - 1, facets)
-    found = found[found < space.dofmap.index_map.size_local]
-    return found, mean[found], least
+    owned = fem.locate_dofs_topological(space, d - 1, facets)
+    owned = owned[owned < space.dofmap.index_map.size_local]
+    return owned, mean[owned], least
 
 
 class Rollers:
@@ -335,7 +337,7 @@ class Rollers:
         chosen = [(i, fixed) for i, fixed in enumerate(body.fixed) if fixed.normal is not None]
         if not chosen:
             return
-        found = []
+        supported = []
         for number, fixed in chosen:
             nodes, normal, least = nodal_normals(domain, space, fixed.on)
             if least < SMOOTH:
@@ -345,13 +347,13 @@ class Rollers:
                     "own",
                     "roller-normal",
                 )
-            found.append((nodes, normal))
+            supported.append((nodes, normal))
         d, size = domain.dim, unsupported.shape[1]
-        every = np.unique(np.concatenate([nodes for nodes, _ in found])).astype(np.int32)
-        places = [np.searchsorted(every, nodes) for nodes, _ in found]
-        normals = np.zeros((every.size, len(found), d))
+        every = np.unique(np.concatenate([nodes for nodes, _ in supported])).astype(np.int32)
+        places = [np.searchsorted(every, nodes) for nodes, _ in supported]
+        normals = np.zeros((every.size, len(supported), d))
         count = np.zeros(every.size, dtype=np.intp)
-        for k, (place, (_, normal)) in enumerate(zip(places, found, strict=True)):
+        for k, (place, (_, normal)) in enumerate(zip(places, supported, strict=True)):
             normals[place, k] = normal
             count[place] += 1
         left, values, right = np.linalg.svd(
@@ -368,9 +370,9 @@ class Rollers:
             assert fixed.normal is not None
             nodes = every[place]
             points = space.tabulate_dof_coordinates()[nodes, :d]
-            own = normals[place, k], lift[place, k], slack[place]
-            given = fixed.normal, fixed.factor, domain.comm
-            self.each.append(Roller(number, nodes, points, *own, *given))
+            directions = normals[place, k], lift[place, k], slack[place]
+            prescription = fixed.normal, fixed.factor, domain.comm
+            self.each.append(Roller(number, nodes, points, *directions, *prescription))
         some = independent.any(axis=1)
         self.inclined = Inclined(every[some], across[some])
         self._nodes, self._borne = every, np.einsum("mki,mkj->mij", normals, lift)
@@ -393,19 +395,19 @@ class Rollers:
 
         Components of other supports remain. Contradictions are refused on all ranks.
         """
-        given = [roller.given(time) for roller in self.each]
-        missing = [g - roller.along(nodal) for g, roller in zip(given, self.each, strict=True)]
+        prescribed = [roller.prescribed(time) for roller in self.each]
+        missing = [g - roller.along(nodal) for g, roller in zip(prescribed, self.each, strict=True)]
         for roller, way in zip(self.each, missing, strict=True):
             nodal[roller.nodes, : self._domain.dim] += roller.lift * way[:, None]
         if self.each and self._spare:
-            self._check(given, [roller.along(nodal) for roller in self.each])
+            self._check(prescribed, [roller.along(nodal) for roller in self.each])
 
-    def _check(self, given: Sequence[Array], met: Sequence[Array]) -> None:
+    def _check(self, prescribed: Sequence[Array], met: Sequence[Array]) -> None:
         """Refuse contradictory displacements at nodes of several supports. Collective."""
         least = ROUNDING * self._domain.size
-        for roller, asked, got in zip(self.each, given, met, strict=True):
-            left = np.abs(asked - got) - roller.slack * np.maximum(np.abs(asked), np.abs(got))
-            wrong = left > least
+        for roller, asked, got in zip(self.each, prescribed, met, strict=True):
+            mismatch = np.abs(asked - got) - roller.slack * np.maximum(np.abs(asked), np.abs(got))
+            wrong = mismatch > least
             rows = np.column_stack([asked, got, roller.points])[wrong][:1]
             every = np.concatenate(self._domain.comm.allgather(rows))
             if not every.size:
@@ -430,9 +432,9 @@ class Rollers:
         return _at(nodes, self._nodes, self._borne)
 
 
-def _at(nodes: NDArray[np.int32], known: NDArray[np.int32], values: Array) -> Array:
+def _at(nodes: NDArray[np.int32], sources: NDArray[np.int32], values: Array) -> Array:
     """Return values at nodes, 0 at those without."""
-    found = np.zeros((nodes.size, *values.shape[1:]))
-    _, at, own = np.intersect1d(nodes, known, return_indices=True)
-    found[at] = values[own]
-    return found
+    extended = np.zeros((nodes.size, *values.shape[1:]))
+    _, at, rows = np.intersect1d(nodes, sources, return_indices=True)
+    extended[at] = values[rows]
+    return extended

@@ -57,8 +57,8 @@ class ElasticSupport(NamedTuple):
     ds: Measure
 
 
-class Given(NamedTuple):
-    """A given load: vector or number, measure, part, factor; whether the value depends on time."""
+class LoadDensity(NamedTuple):
+    """A load per area or volume: value, measure, part, factor; whether the value varies in time."""
 
     value: Expr
     over: Measure
@@ -71,7 +71,7 @@ class Term(NamedTuple):
     """A term of the residual; of a load, without its amplitude."""
 
     form: ufl.Form
-    load: Given | None = None
+    load: LoadDensity | None = None
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class WeakForm:
     solids: Sequence[Solid]
     elastic: Sequence[ElasticSupport]
     #: By their keys in the case file, ``traction`` with resultants too.
-    loads: Mapping[str, Sequence[Given]]
+    loads: Mapping[str, Sequence[LoadDensity]]
 
     def residual(
         self, x: Fields, z: Fields, secant_at: Expr | None = None, history_at: Expr | None = None
@@ -132,18 +132,18 @@ class WeakForm:
 
     def body_forces(self, z: Fields) -> list[Term]:
         """Return - int_Omega f_0 . v dx, (3.8)."""
-        given = self.loads.get("body_force", ())
-        return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in given]
+        loads = self.loads.get("body_force", ())
+        return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in loads]
 
     def tractions(self, z: Fields) -> list[Term]:
         """Return - int_Gamma_2 f_2 . v da, (3.8); of a resultant force F, f_2 = F/|Gamma_2|."""
-        given = self.loads.get("traction", ())
-        return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in given]
+        loads = self.loads.get("traction", ())
+        return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in loads]
 
     def pressures(self, z: Fields) -> list[Term]:
         """Return int_Gamma_2 p v_nu da: the traction f_2 = -p nu."""
-        given = self.loads.get("pressure", ())
-        return [Term(p.value * ufl.dot(self.nu, z.u) * p.over, p) for p in given]
+        loads = self.loads.get("pressure", ())
+        return [Term(p.value * ufl.dot(self.nu, z.u) * p.over, p) for p in loads]
 
     def charges(self, z: Fields) -> list[Term]:
         """Return int_Omega q_0 xi dx - int_Gamma_b q_2 xi da, (5.29)."""

@@ -310,7 +310,7 @@ def _members(problem: ContactProblem) -> list[list[str]]:
         if isinstance(given, Rigid):
             names = ["displacement", "force", "rotation (radians)", "moment"]
             where = f"{'foundation of' if given.foundation else 'rigid part'} {given.on!r}"
-        moves = member.given(problem.time) * member.units
+        moves = member.prescribed(problem.time) * member.units
         forces = member.forces(problem.time) / member.units
         values = [moves[:d], forces[:d], moves[d:], forces[d:]]
         rows += [
