@@ -62,18 +62,18 @@ def gap_gradient(solution: Solution, quantity: str | Functional) -> Array:
     >>> gradient = gap_gradient(solution, "max_pressure")  # doctest: +SKIP
     >>> points = solution.problem.nodes.points  # doctest: +SKIP
     """
-    path, asked = LoadPath(solution), _one(solution, quantity)
+    path, functionals = LoadPath(solution), _one(solution, quantity)
     law = solution.problem.interface.foundation
     if law.layer is not None or law.follows_gap:
         raise InputError(
             "gap_gradient: the layer or charge depends on the gap; accepted: neither",
             "no-derivative",
         )
-    found = np.zeros_like(solution.problem.nodes.gap)
-    for linearised, adjoints in backwards(path, asked):
+    gradient = np.zeros_like(solution.problem.nodes.gap)
+    for linearised, adjoints in backwards(path, functionals):
         for one in adjoints.values():
-            found += linearised.by_gap(one.x, one.conditions)
-    return found
+            gradient += linearised.by_gap(one.x, one.conditions)
+    return gradient
 
 
 def field_gradient(
@@ -122,32 +122,32 @@ def field_gradient(
     key = parameter if isinstance(parameter, str) else "parameter"
     inside = not isinstance(parameter, str) or key.split(".")[0] == MATERIAL
     expect("field_gradient: parameter", key, "a constant of a material: material.young", inside)
-    path, asked = LoadPath(solution), _one(solution, quantity)
-    given = [parameter] if isinstance(parameter, str) else {key: parameter}
-    ((_, made),) = parameters_of(solution, given)
-    family, element = family_of(key, made, path.steps), ("Lagrange" if degree else "DG", degree)
+    path, functionals = LoadPath(solution), _one(solution, quantity)
+    parameters = [parameter] if isinstance(parameter, str) else {key: parameter}
+    ((_, constant),) = parameters_of(solution, parameters)
+    family, element = family_of(key, constant, path.steps), ("Lagrange" if degree else "DG", degree)
     gradient = fem.Function(fem.functionspace(path.base.domain.mesh, element), name="gradient")
     space = gradient.function_space
-    works = [_FieldWork(there.body, space) for there in family.problems]
-    found = np.zeros(space.dofmap.index_map.size_local)
-    for linearised, adjoints in backwards(path, asked):
+    works = [_FieldWork(problem.body, space) for problem in family.problems]
+    values = np.zeros(space.dofmap.index_map.size_local)
+    for linearised, adjoints in backwards(path, functionals):
         state, scale = linearised.state, linearised.problem.body.phi_scale
         for one in adjoints.values():
             weights = None if one.after is None else one.after.get(VARIABLES)
             assert weights is None or isinstance(weights, InternalVariables)
-            found += family.slope([work(state, one.along, scale, weights) for work in works])
-    gradient.x.array[: found.size] = found
+            values += family.slope([work(state, one.along, scale, weights) for work in works])
+    gradient.x.array[: values.size] = values
     gradient.x.scatter_forward()
     return gradient
 
 
 def _one(solution: Solution, quantity: str | Functional) -> Mapping[str, Differentiable]:
     """Return a quantity with a gradient, by its name. Collective."""
-    given = [quantity] if isinstance(quantity, str) else {"quantity": quantity}
-    ((name, found),) = quantities_of(solution, given).items()
+    quantities = [quantity] if isinstance(quantity, str) else {"quantity": quantity}
+    ((name, functional),) = quantities_of(solution, quantities).items()
     words = "a quantity with a gradient"
-    expect("quantity", found, words, isinstance(found, Differentiable))
-    return {name: found}  # type: ignore[dict-item]
+    expect("quantity", functional, words, isinstance(functional, Differentiable))
+    return {name: functional}  # type: ignore[dict-item]
 
 
 class _FieldWork:
@@ -182,8 +182,8 @@ class _FieldWork:
             nodal[:, body.dim :] *= phi_scale / body.phi_scale
             into.x.array[:] = nodal.ravel()
         body.laws.set(state)
-        found = sum(assembled(form, self._owned) for form in self._forms)
+        work = sum(assembled(form, self._owned) for form in self._forms)
         if after is not None:
             body.laws.weigh(state, after)
-            found = found + assembled(self._weighted, self._owned)
-        return np.asarray(found)
+            work = work + assembled(self._weighted, self._owned)
+        return np.asarray(work)

@@ -160,52 +160,56 @@ def sensitivity(
     accepted = f"{AUTO!r}, {TANGENT!r} or {ADJOINT!r}"
     expect("method", method, accepted, method in (AUTO, TANGENT, ADJOINT))
     path = LoadPath(solution)
-    asked = quantities_of(solution, quantities)
+    functionals = quantities_of(solution, quantities)
     named = parameters_of(solution, parameters)
-    families = {name: family_of(name, given, path.steps) for name, given in named}
-    smooth = _with_gradients(asked)
-    blind = [name for name in asked if name not in smooth]
+    families = {name: family_of(name, parameter, path.steps) for name, parameter in named}
+    smooth = _with_gradients(functionals)
+    blind = [name for name in functionals if name not in smooth]
     if method == ADJOINT and blind:
         raise InputError(
             f"method: given 'adjoint'; the quantity {blind[0]!r} has no gradient; accepted: "
             "'tangent'",
             "value",
         )
-    adjoint = method == ADJOINT or (method == AUTO and len(asked) < len(families) and not blind)
-    found = Sensitivities(ADJOINT if adjoint else TANGENT, path.counters, path.weakly_active())
+    adjoint = method == ADJOINT or (
+        method == AUTO and len(functionals) < len(families) and not blind
+    )
+    sensitivities = Sensitivities(
+        ADJOINT if adjoint else TANGENT, path.counters, path.weakly_active()
+    )
     if adjoint:
-        _adjoint(path, smooth, families, found)
+        _adjoint(path, smooth, families, sensitivities)
     else:
-        _tangent(path, asked, families, found)
-    if found.weakly_active.size:
+        _tangent(path, functionals, families, sensitivities)
+    if sensitivities.weakly_active.size:
         logger.warning(
             "%s between two states, the first at %s: results have a kink there, and derivatives "
             "may be those of neither side",
-            counted(len(found.weakly_active), "contact node"),
-            np.round(found.weakly_active[0], 6).tolist(),
+            counted(len(sensitivities.weakly_active), "contact node"),
+            np.round(sensitivities.weakly_active[0], 6).tolist(),
         )
-    return found
+    return sensitivities
 
 
 def quantities_of(
-    solution: Solution, given: Sequence[str] | Mapping[str, Functional]
+    solution: Solution, quantities: Sequence[str] | Mapping[str, Functional]
 ) -> Mapping[str, Functional]:
     """Return quantities by name. Collective."""
-    if isinstance(given, Mapping):
-        return given
-    known = named_functionals(solution.problem)
-    for name in given:
-        accepted = ", ".join(known) + "; or a function of problem and state"
-        expect("quantities", name, accepted, name in known)
-    return {name: known[name] for name in given}
+    if isinstance(quantities, Mapping):
+        return quantities
+    functionals = named_functionals(solution.problem)
+    for name in quantities:
+        accepted = ", ".join(functionals) + "; or a function of problem and state"
+        expect("quantities", name, accepted, name in functionals)
+    return {name: functionals[name] for name in quantities}
 
 
 def parameters_of(
-    solution: Solution, given: Sequence[str] | Mapping[str, Parameter]
+    solution: Solution, parameters: Sequence[str] | Mapping[str, Parameter]
 ) -> list[tuple[str, Parameter]]:
     """Return parameters with their names."""
-    if isinstance(given, Mapping):
-        return [*given.items()]
+    if isinstance(parameters, Mapping):
+        return [*parameters.items()]
     case = solution.source
     if not isinstance(case, Case):
         raise InputError(
@@ -214,7 +218,7 @@ def parameters_of(
             "value",
         )
     domain, comm = solution.problem.domain, solution.problem.comm
-    for key in given:
+    for key in parameters:
         sections, value = key.split("."), number_at(case, key)
         accepted = "a number of the mesh, materials, supports, loads, contact or rigid parts"
         expect("parameters", key, accepted, sections[0] not in WITHOUT)
@@ -232,7 +236,7 @@ def parameters_of(
         kept = None if key.split(".")[0] == "mesh" else domain
         return build_problem(with_number(case, key, value), comm, domain=kept)
 
-    return [(key, Parameter(number_at(case, key), partial(build, key))) for key in given]
+    return [(key, Parameter(number_at(case, key), partial(build, key))) for key in parameters]
 
 
 @dataclass(frozen=True)
@@ -277,40 +281,42 @@ def family_of(
     InputError if no value beside it is accepted, or contact nodes, mesh or internal variables
     change.
     """
-    base, step, found, fault = steps[0][0], STEP * (abs(parameter.value) or 1.0), None, None
+    base, step, family, fault = steps[0][0], STEP * (abs(parameter.value) or 1.0), None, None
     for _ in range(TRIES):
         try:
-            made = _made(name, parameter, (step, -step), base)
+            trial = _difference(name, parameter, (step, -step), base)
         except InputError as error:
             fault = fault or error
-            if found is not None:
+            if family is not None:
                 break
             step /= FACTOR
             continue
-        if found is not None and len(made.problems) > len(found.problems):
+        if family is not None and len(trial.problems) > len(family.problems):
             break  # across a border
-        found, change = made, _change(made, steps)
-        # Of a number as small as 1e-12 rounding leaves nothing of its own steps.
+        family, change = trial, _change(trial, steps)
+        # Steps in proportion to a number as small as 1e-12 are lost in rounding.
         if LEAST <= change <= MOST or (change == 0 and step >= STEP and parameter.value != 0):
             break
         step *= np.clip(AIM / change, 1 / FACTOR, FACTOR) if change > 0 else FACTOR
-    if found is None:
+    if family is None:
         assert fault is not None
         raise fault
-    closing = _closing(base, found)
+    closing = _closing(base, family)
     if not closing:
-        return found
-    apart = [way for way in found.ways if way not in closing]
+        return family
+    apart = [way for way in family.ways if way not in closing]
     if not apart:
         raise InputError(
             f"{name}: bodies touch, and overlap beside {parameter.value:g}; accepted: bodies that "
             "are apart, or a given gap",
             "border",
         )
-    return _made(name, parameter, apart, base)
+    return _difference(name, parameter, apart, base)
 
 
-def _made(name: str, parameter: Parameter, ways: Sequence[float], base: ContactProblem) -> Family:
+def _difference(
+    name: str, parameter: Parameter, ways: Sequence[float], base: ContactProblem
+) -> Family:
     """Return a central difference, or a one-sided one at a border. Collective."""
     problems, faults = dict[float, ContactProblem](), list[InputError]()
     for way in ways:
@@ -346,8 +352,8 @@ def _closing(base: ContactProblem, family: Family) -> list[float]:
     # Overlaps of rounding are gaps of 0, which do not change with the parameter.
     if len(family.problems) > 2:
         return []
-    there = np.isfinite(base.nodes.gap)
-    rises = [np.abs(problem.nodes.gap - base.nodes.gap)[there] for problem in family.problems]
+    facing = np.isfinite(base.nodes.gap)
+    rises = [np.abs(problem.nodes.gap - base.nodes.gap)[facing] for problem in family.problems]
     most = np.maximum(*rises)
     least = SEEN * base.comm.allreduce(float(most.max(initial=0.0)), op=MPI.MAX)
     least = max(least, EPS * base.domain.size)
@@ -360,7 +366,7 @@ def _closing(base: ContactProblem, family: Family) -> list[float]:
 
 def _change(family: Family, steps: Sequence[tuple[ContactProblem, State]]) -> float:
     """Return the largest relative change of the equations of all steps. Collective."""
-    found = 0.0
+    largest = 0.0
     for base, state in reversed(steps):
         active, norms = active_set(base, state), reference_norms(base, state)
         one, other = (
@@ -369,16 +375,16 @@ def _change(family: Family, steps: Sequence[tuple[ContactProblem, State]]) -> fl
         )
         forces = base.body.norm(one.forces - other.forces) / norms[0]
         conditions = base.nodes.norm(one.conditions - other.conditions) / norms[1]
-        found = max(found, forces, conditions)
-        if found >= LEAST:  # large enough: no earlier steps
+        largest = max(largest, forces, conditions)
+        if largest >= LEAST:  # large enough: no earlier steps
             break
-    return found
+    return largest
 
 
 def at(problem: ContactProblem, state: State) -> tuple[ContactProblem, State]:
     """Return step and state of another problem, with its prescribed values. Collective."""
-    here = problem.at(state.time, state.history)
-    return here, replace(state, x=here.body.prescribe(state.x, state.time))
+    step_problem = problem.at(state.time, state.history)
+    return step_problem, replace(state, x=step_problem.body.prescribe(state.x, state.time))
 
 
 class LoadPath:
@@ -433,8 +439,8 @@ def _moved(family: Family, state: State, x: Array, forces: Array, change: Histor
     """Return the problems and states beside a parameter, with dz/dm and dh/dm. Collective."""
     sides = []
     for way, problem in zip(family.ways, family.problems, strict=True):
-        there = moved_state(problem, state, way * x, way * forces)
-        sides.append(at(problem, replace(there, history=_sum(state.history, way, change))))
+        moved = moved_state(problem, state, way * x, way * forces)
+        sides.append(at(problem, replace(moved, history=_sum(state.history, way, change))))
     return sides
 
 
@@ -447,19 +453,19 @@ def _sum(history: History, factor: float, change: History) -> History:
 def _explicit(family: Family, state: State, linearised: Linearised) -> tuple[Equations, _Sides]:
     """Return dG/dm at fixed z and h, and the problems and states of the difference. Collective."""
     sides = [at(problem, state) for problem in family.problems]
-    found = [equations(*side, linearised.active) for side in sides]
+    by_side = [equations(*side, linearised.active) for side in sides]
     change = Equations(
-        family.slope([one.forces for one in found]),
-        family.slope([one.conditions for one in found]),
+        family.slope([one.forces for one in by_side]),
+        family.slope([one.conditions for one in by_side]),
     )
     return change, sides
 
 
 def _explicit_history(family: Family, sides: _Sides) -> History:
     """Return dH/dm at fixed z and h. Collective."""
-    found = [here.commit(there) for here, there in sides]
-    every = [one.arrays() for one in found]
-    return found[0].replaced({k: family.slope([one[k] for one in every]) for k in every[0]})
+    histories = [problem.commit(state) for problem, state in sides]
+    arrays = [one.arrays() for one in histories]
+    return histories[0].replaced({k: family.slope([one[k] for one in arrays]) for k in arrays[0]})
 
 
 def _slope_of(family: Family, quantity: Functional, sides: _Sides) -> float:
@@ -476,7 +482,7 @@ def _tangent(
     path: LoadPath,
     quantities: Mapping[str, Functional],
     families: Mapping[str, Family],
-    found: Sensitivities,
+    sensitivities: Sensitivities,
 ) -> None:
     """Carry the tangent of each parameter forwards through the steps. Collective."""
     rows: dict[str, dict[str, list[float]]] = {
@@ -487,8 +493,8 @@ def _tangent(
     for index, (problem, state) in enumerate(path.steps):
         linearised, body = path.linearised(index), problem.body
         gradients = {
-            name: given.gradient(problem, state)
-            for name, given in _with_gradients(quantities).items()
+            name: quantity.gradient(problem, state)
+            for name, quantity in _with_gradients(quantities).items()
         }
         for key, family in families.items():
             change, still = _explicit(family, state, linearised)
@@ -510,8 +516,8 @@ def _tangent(
                 ends = commit_along(linearised, x, histories[key])
                 histories[key] = _sum(ends, 1.0, _explicit_history(family, still))
     for name, columns in rows.items():
-        found.steps[name] = {key: np.array(values) for key, values in columns.items()}
-        found[name] = {key: values[-1] for key, values in columns.items()}
+        sensitivities.steps[name] = {key: np.array(values) for key, values in columns.items()}
+        sensitivities[name] = {key: values[-1] for key, values in columns.items()}
 
 
 @dataclass(frozen=True)
@@ -542,8 +548,10 @@ def backwards(
                 by_x = commit_transposed(problem, state, end)
                 by_force = np.zeros_like(problem.nodes.normal)
             x, conditions = linearised.solve_transposed(by_x, by_force)
-            own = quantity.weights(problem) if isinstance(quantity, Reaction) and not end else 0.0
-            adjoints[name] = Adjoint(x, conditions, own - x, end)
+            weights = (
+                quantity.weights(problem) if isinstance(quantity, Reaction) and not end else 0.0
+            )
+            adjoints[name] = Adjoint(x, conditions, weights - x, end)
         yield linearised, adjoints
         if index > 0:
             after = {
@@ -556,25 +564,25 @@ def _adjoint(
     path: LoadPath,
     quantities: Mapping[str, Differentiable],
     families: Mapping[str, Family],
-    found: Sensitivities,
+    sensitivities: Sensitivities,
 ) -> None:
     """Carry the adjoint of each quantity backwards through the steps. Collective."""
     for name in quantities:
-        found[name] = dict.fromkeys(families, 0.0)
+        sensitivities[name] = dict.fromkeys(families, 0.0)
     for linearised, adjoints in backwards(path, quantities):
         problem, state = linearised.problem, linearised.state
         for key, family in families.items():
             change, sides = _explicit(family, state, linearised)
             for name, one in adjoints.items():
-                found[name][key] -= problem.body.product(one.x, change.forces)
-                found[name][key] -= _total(problem, one.conditions, change.conditions)
+                sensitivities[name][key] -= problem.body.product(one.x, change.forces)
+                sensitivities[name][key] -= _total(problem, one.conditions, change.conditions)
                 if one.after is None:
                     quantity = _located(quantities[name], problem, state)
-                    found[name][key] += _slope_of(family, quantity, sides)
+                    sensitivities[name][key] += _slope_of(family, quantity, sides)
                     continue
                 ends = _explicit_history(family, sides).arrays()
                 for part, weights in one.after.arrays().items():
-                    found[name][key] += _total(problem, weights, ends[part])
+                    sensitivities[name][key] += _total(problem, weights, ends[part])
 
 
 def _total(problem: ContactProblem, one: Array, other: Array) -> float:

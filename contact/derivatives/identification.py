@@ -139,14 +139,14 @@ def identify(
     (0.297, 0.303)
     """
     cases = [case] if isinstance(case, Case) else list(case)
-    given = [data] if isinstance(data, Mapping) else list(data)
-    expect("data", len(given), f"{len(cases)}, one a case", len(given) == len(cases))
+    measurements = [data] if isinstance(data, Mapping) else list(data)
+    expect("data", len(measurements), f"{len(cases)}, one a case", len(measurements) == len(cases))
     single = not isinstance(parameters, str) and len(set(parameters)) == len(parameters)
     accepted = "a list of keys, each once"
     expect("parameters", parameters, accepted, single and len(parameters) > 0)
     for key in (bounds or {}).keys() - set(parameters):
         expect("bounds", key, f"one of the parameters {', '.join(parameters)}", False)
-    models = [_Model(*pair, comm, monitor) for pair in zip(cases, given, strict=True)]
+    models = [_Model(*pair, comm, monitor) for pair in zip(cases, measurements, strict=True)]
     first = np.array([number_at(cases[0], key) for key in parameters])
     bounds = bounds or {}
     limits = [bounds.get(key) or (_least(cases, key), np.inf) for key in parameters]
@@ -181,7 +181,7 @@ def identify(
     inside = INSIDE * np.maximum(1.0, np.abs(first))
     begin = np.clip(first, low + inside, np.maximum(high - inside, low + inside))
     residuals(begin)  # its errors are the user's
-    found = least_squares(
+    optimum = least_squares(
         trial,
         begin,
         jac=jacobian,
@@ -191,11 +191,11 @@ def identify(
         xtol=ENOUGH,
         gtol=ENOUGH,
     )
-    size = np.maximum(np.abs(first), np.abs(found.x))
+    size = np.maximum(np.abs(first), np.abs(optimum.x))
     scale = np.where(size > 0, size, 1.0)
-    left = residuals(found.x)
-    freedom = left.size - found.x.size
-    covariance, unseen = _covariance(found.jac, scale, left @ left / freedom)
+    residual = residuals(optimum.x)
+    freedom = residual.size - optimum.x.size
+    covariance, unseen = _covariance(optimum.jac, scale, residual @ residual / freedom)
     deviation = np.sqrt(np.diag(covariance))
     half = student.ppf(0.5 * (1 + level), freedom) * deviation
     size = np.where((deviation > 0) & ~unseen, deviation, 1.0)
@@ -207,20 +207,20 @@ def identify(
             ", ".join(undetermined),
         )
     return Identified(
-        parameters=dict(zip(parameters, found.x.tolist(), strict=True)),
+        parameters=dict(zip(parameters, optimum.x.tolist(), strict=True)),
         intervals={
             key: (float(value - way), float(value + way))
-            for key, value, way in zip(parameters, found.x, half, strict=True)
+            for key, value, way in zip(parameters, optimum.x, half, strict=True)
         },
         level=level,
         covariance=covariance,
         correlation=covariance / np.outer(size, size),
         undetermined=undetermined,
-        at_bound=tuple(key for key, on in zip(parameters, found.active_mask, strict=True) if on),
+        at_bound=tuple(key for key, on in zip(parameters, optimum.active_mask, strict=True) if on),
         fits=tuple(model.fit for model in models),
-        misfit=float(np.sqrt(np.mean(left**2))),
+        misfit=float(np.sqrt(np.mean(residual**2))),
         solutions=tuple(model.solution for model in models),
-        evaluations=found.nfev,
+        evaluations=optimum.nfev,
     )
 
 
@@ -229,11 +229,11 @@ def _covariance(slopes: Array, scale: Array, variance: float) -> tuple[Array, ND
 
     Of derivatives (n, k) of the residuals, sizes (k,) of the parameters, variance of a residual.
     """
-    _, singular, ways = np.linalg.svd(slopes * scale, full_matrices=False)
+    _, singular, directions = np.linalg.svd(slopes * scale, full_matrices=False)
     seen = singular > UNSEEN * singular.max()
-    unseen = np.abs(ways[~seen]).max(axis=0, initial=0.0) > SHARE
-    made = ways[seen] / singular[seen, None]
-    covariance = variance * np.outer(scale, scale) * (made.T @ made)
+    unseen = np.abs(directions[~seen]).max(axis=0, initial=0.0) > SHARE
+    factor = directions[seen] / singular[seen, None]
+    covariance = variance * np.outer(scale, scale) * (factor.T @ factor)
     covariance[unseen] = covariance[:, unseen] = np.nan
     covariance[unseen, unseen] = np.inf
     return covariance, unseen
@@ -303,24 +303,24 @@ class _Model:
                 "identification-start",
             )
         rows = [record.row for record in self.solution.steps]
-        known = ", ".join(rows[0])
+        columns = ", ".join(rows[0])
         for name in self._measured:
-            expect("data", name, f"columns of steps.csv: {known}", name in rows[0])
+            expect("data", name, f"columns of steps.csv: {columns}", name in rows[0])
         self.fit = {name: self._at([row[name] for row in rows]) for name in self._measured}
-        left = [
+        scaled = [
             (self.fit[name] - measured) / self._scale[name]
             for name, measured in self._measured.items()
         ]
-        misfit = float(np.sqrt(np.mean(np.square(left))))
+        misfit = float(np.sqrt(np.mean(np.square(scaled))))
         logger.info("%s: misfit %.3g of the largest values", shown, misfit)
-        return np.concatenate(left)
+        return np.concatenate(scaled)
 
     def jacobian(self, keys: Sequence[str]) -> Array:
         """Return the derivatives of the residuals of the last run."""
-        found = sensitivity(self.solution, [*self._measured], keys, "tangent").steps
+        slopes = sensitivity(self.solution, [*self._measured], keys, "tangent").steps
         return np.concatenate(
             [
-                np.column_stack([self._at(found[name][key]) / self._scale[name] for key in keys])
+                np.column_stack([self._at(slopes[name][key]) / self._scale[name] for key in keys])
                 for name in self._measured
             ]
         )
