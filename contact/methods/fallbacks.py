@@ -95,8 +95,8 @@ def solve_contact(
     """
     state, outcome = semismooth.iterate(begin, give_up=True)
     if outcome.converged and semismooth.modes.unconstrained_at(semismooth.problem, state):
-        found = fall_back(semismooth, state, outcome, condensed_steps)
-        return found if found[1].converged else (state, outcome)
+        end = fall_back(semismooth, state, outcome, condensed_steps)
+        return end if end[1].converged else (state, outcome)
     if outcome.final:
         return state, outcome
     return fall_back(semismooth, state, outcome, condensed_steps)
@@ -138,20 +138,20 @@ def fall_back(
         partial(on_condensed_body, semismooth, condensed_steps),
     ):
         try:
-            found = fallback()
+            end = fallback()
         except SingularError as error:
             singular = error
             continue
-        if found is not None:
-            state, outcome = found
+        if end is not None:
+            state, outcome = end
             if outcome.final:
-                return found
+                return end
     # A nonlinear material may be singular at the strains of a step alone.
     if singular is not None and semismooth.problem.body.linear and not outcome.converged:
         raise singular
-    if outcome.converged or semismooth.best.found is None:
+    if outcome.converged or semismooth.best.iterate is None:
         return state, outcome
-    best = semismooth.best.found
+    best = semismooth.best.iterate
     return best, replace(outcome, residuals=evaluate(semismooth.problem, best))
 
 
@@ -163,7 +163,7 @@ def all_open(semismooth: SemismoothNewton) -> State | None:
     """
     if not semismooth.modes.constrained_by_supports:
         return None
-    problem, best = semismooth.problem, semismooth.best.found
+    problem, best = semismooth.problem, semismooth.best.iterate
     try:
         return semismooth.step.without_contact(problem, problem.start() if best is None else best)
     except SingularError:  # the potential may be floating without contact
@@ -181,12 +181,12 @@ def working_set(semismooth: SemismoothNewton, without_contact: State | None) -> 
     residuals = evaluate(problem, without_contact)
     if not residuals.excess(allowed):
         return without_contact, Outcome(residuals, allowed)
-    found = dual_active_set(semismooth, without_contact)
-    if found is None:
+    candidate = dual_active_set(semismooth, without_contact)
+    if candidate is None:
         return None
-    residuals = evaluate(problem, found)
-    semismooth.see(found, residuals)
-    return None if residuals.excess(allowed) else (found, Outcome(residuals, allowed))
+    residuals = evaluate(problem, candidate)
+    semismooth.see(candidate, residuals)
+    return None if residuals.excess(allowed) else (candidate, Outcome(residuals, allowed))
 
 
 def interior_points(
@@ -204,9 +204,9 @@ def on_condensed_body(semismooth: SemismoothNewton, condensed_steps: Stage | Non
     """Return the end of steps on the condensed body, where they do not pay as the first stage."""
     if condensed_steps is None or semismooth.steps_left <= 0:
         return None
-    found = condensed_steps(semismooth.problem.start())
+    end = condensed_steps(semismooth.problem.start())
     # The reason of the interior point says more, unless no steps are left.
-    return found if found[1].converged or semismooth.steps_left <= 0 else None
+    return end if end[1].converged or semismooth.steps_left <= 0 else None
 
 
 def rigid_motion(semismooth: SemismoothNewton, outcome: Outcome) -> End | None:
@@ -221,10 +221,10 @@ def rigid_motion(semismooth: SemismoothNewton, outcome: Outcome) -> End | None:
         return None
     # No force acts there: relative to the forces at zero displacement.
     body = problem.body
-    left, first = (
+    unbalanced, first = (
         body.norm(body.unbalanced(residual_forces(problem, at))) for at in (state, problem.start())
     )
-    equilibrium = left / first if first > 0 else 0.0
+    equilibrium = unbalanced / first if first > 0 else 0.0
     residuals = replace(evaluate(problem, state), equilibrium=equilibrium)
     semismooth.recorder.record(residuals, RIGID_MOTION, inner=2)
     semismooth.see(state, residuals)
@@ -332,19 +332,19 @@ def layer_secants(semismooth: SemismoothNewton) -> End | None:
         method = semismooth.on(problem.with_interface(replace(interface, foundation=bed)))
         state, outcome = method.iterate(state, note=SECANT)
         if not outcome.converged:
-            found = proximal_points(method)
-            if found is None:
+            end = proximal_points(method)
+            if end is None:
                 return None
-            state = found[0]
+            state = end[0]
         jump = interface.nodes.jump(state.x)
         before, regimes = regimes, foundation.regimes(jump)
         changed = float(summed(interface.comm, not np.array_equal(regimes, before))) > 0
         unchanged = 0 if changed else unchanged + 1
         balanced = evaluate(problem, state).significant <= near
         if balanced or unchanged == 1:
-            found = semismooth.iterate(semismooth.started(state), note=SECANT)
-            if found[1].converged:
-                return found
+            end = semismooth.iterate(semismooth.started(state), note=SECANT)
+            if end[1].converged:
+                return end
         near = NEARER_BY * near if balanced else near
         secant = foundation.secant(jump)
     return None
@@ -381,9 +381,9 @@ def proximal_points(semismooth: SemismoothNewton) -> End | None:
             if residual < NEARER * least:
                 least, stagnant = residual, 0
             if residual <= NEARLY_BALANCED:
-                found = semismooth.iterate(semismooth.started(state), note=PROXIMAL_POINT)
-                if found[1].converged:
-                    return found
+                end = semismooth.iterate(semismooth.started(state), note=PROXIMAL_POINT)
+                if end[1].converged:
+                    return end
         elif least == np.inf or semismooth.steps_left <= 0:
             return None
         else:

@@ -237,14 +237,14 @@ class Cones:
 
     def _relative(self, step: ConeStep) -> list[tuple[Array, Array]]:
         """Return x_0 and |x_1| of both directions, in the frame in which lambda is (1, 0)."""
-        unit, found = self._lambda / self._size[:, None], []
+        unit, pairs = self._lambda / self._size[:, None], []
         for moved in self._scaled(step):
             lead = _mixed(unit, moved)
             part = (lead + _lead(moved)[:, 0]) / (_lead(unit)[:, 0] + 1)
             rest = moved - part[:, None] * unit
             size = np.hypot((rest[:, 1] - rest[:, 0]) / 2, np.linalg.norm(rest[:, 2:], axis=1))
-            found.append((lead / self._size, size / self._size))
-        return found
+            pairs.append((lead / self._size, size / self._size))
+        return pairs
 
 
 def _determinant(lead: Array, tail: Array) -> Array:
@@ -427,9 +427,9 @@ class InteriorPoint:
         ways = np.abs(interface.gap) + np.abs(nodes.normal_component(jump))
         slips = interface.slip_length(jump)[self._frictional]
         contact = float(summed(nodes.comm, cones.force @ ways[self._rigid] + cones.bound @ slips))
-        own = body.owned_part(x)[: body.owned]
+        nodal = body.owned_part(x)[: body.owned]
         forces = self._evaluated.internal, body.external(self._state.time)
-        works = [abs(float(summed(nodes.comm, own @ force[: body.owned]))) for force in forces]
+        works = [abs(float(summed(nodes.comm, nodal @ force[: body.owned]))) for force in forces]
         return cones.duality_gap() / (max(contact + sum(works), self._least_work) or 1.0)
 
     @np.errstate(over="ignore", invalid="ignore")  # such a step is not taken

@@ -65,10 +65,10 @@ class LoadStepping:
 
     def _step(self, now: float, end: float, whole: float) -> tuple[State, Outcome]:
         """Step to a time, or halve the step; loads that release a body are not tried."""
-        left = end - now
+        remaining = end - now
         sizes = [whole / 2**k for k in range(HALVINGS + 1)]
-        for size in [size for size in sizes if size <= left * (1 + 1e-9)] or [left]:
-            time = end if size >= left * (1 - 1e-9) else now + size
+        for size in [size for size in sizes if size <= remaining * (1 + 1e-9)] or [remaining]:
+            time = end if size >= remaining * (1 - 1e-9) else now + size
             state, outcome = self._solve(time, release_message(self._unilateral, now, time))
             if outcome.converged or outcome.signal:
                 break
@@ -116,8 +116,8 @@ def predicted(problem: ContactProblem, ends: Sequence[tuple[ContactProblem, Stat
 def _extrapolation(problem: ContactProblem, ends: Sequence[tuple[ContactProblem, State]]) -> float:
     """Return the least of df.df0/df0.df0: increments of loads and prescribed values."""
     product, factors = problem.body.product, []
-    before, last = (_given(there, state.time) for there, state in ends[-2:])
-    now = _given(problem, problem.time)
+    before, last = (_loading(earlier, state.time) for earlier, state in ends[-2:])
+    now = _loading(problem, problem.time)
     for first, second, third in zip(before, last, now, strict=True):
         come, going = second - first, third - second
         square = product(come, come)
@@ -126,7 +126,7 @@ def _extrapolation(problem: ContactProblem, ends: Sequence[tuple[ContactProblem,
     return float(np.clip(min(factors, default=0.0), 0.0, FARTHEST))
 
 
-def _given(problem: ContactProblem, time: float) -> tuple[Array, Array]:
+def _loading(problem: ContactProblem, time: float) -> tuple[Array, Array]:
     """Return the owned loads and prescribed values at a time."""
     body = problem.body
     return body.external(time), body.owned_part(body.prescribe(body.zero_displacement(), time))

@@ -87,8 +87,8 @@ def solve_step(
         records=tuple(method.history),
         counters=method.counters - counted,
     )
-    found = evaluated(problem, state, outcome)
-    return with_least_displacements(modes or UnconstrainedModes(problem), *found)
+    end = evaluated(problem, state, outcome)
+    return with_least_displacements(modes or UnconstrainedModes(problem), *end)
 
 
 def evaluated(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:

@@ -113,8 +113,8 @@ class Chord:
             state, reached, reuse = before, last, False
         else:
             rate = reached / last
-            left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
-            reuse = bool(left <= self._most_steps and reached <= RADIUS)
+            steps_left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
+            reuse = bool(steps_left <= self._most_steps and reached <= RADIUS)
         self._before, self._reached, self._reused = state, reached, reuse
         self._factorised = True
         return state, reuse
@@ -233,8 +233,8 @@ class Newton:
             monitor.record(note, "tangent" * tangent, steps=records)
             if overloaded and not monitor.converged:
                 return state, replace(monitor.outcome(OVERLOADED), overloaded=True)
-            if (found := monitor.ended()) is not None:
-                return found
+            if (ended := monitor.ended()) is not None:
+                return ended
             if not body.linear:
                 tangent = monitor.next_is_tangent(tangent, last.residuals)
             if (stalled := monitor.stalled()) is not None:

@@ -218,10 +218,10 @@ class NewtonStep:
 
 def _residual(problem: AnyProblem, iterate: EvaluatedState, laws: LinearisedLaws) -> Array:
     """Return G(x, lambda^0), with the linearised pressure of the layer. Collective."""
-    here, nodes = replace(iterate.state, forces=laws.multipliers), problem.interface.nodes
+    state, nodes = replace(iterate.state, forces=laws.multipliers), problem.interface.nodes
     at = iterate.state.secant_at
     internal = iterate.internal if at is None else problem.body.secant_forces(iterate.state)
-    residual = residual_forces(problem, here, internal)
+    residual = residual_forces(problem, state, internal)
     nodes.add_jump_transposed((nodes.weight * laws.layer_shift)[:, None] * nodes.normal, residual)
     return residual
 

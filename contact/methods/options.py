@@ -63,7 +63,7 @@ class FixedPointOptions(LoopOptions):
     """Tolerance of the inner loop. Default: a tenth of `tolerance`."""
     r: Annotated[
         Annotated[Literal["auto"], Tag(":text")] | Annotated[Positive, Tag(":number")],
-        Discriminator(lambda given: ":text" if isinstance(given, str) else ":number"),
+        Discriminator(lambda r: ":text" if isinstance(r, str) else ":number"),
         Accepted('"auto" or a number > 0'),
     ] = "auto"
     """Augmentation parameter of the Uzawa block relaxation (stress/length). `auto` fits a block;

@@ -178,15 +178,15 @@ T = TypeVar("T")
 
 @dataclass
 class Best(Generic[T]):
-    """Iterate of least residual, `found`: the end of a method that fails."""
+    """The iterate of least residual: the end of a method that fails."""
 
-    found: T | None = None
+    iterate: T | None = None
     _least: float = np.inf
 
     def see(self, iterate: T, residual: float) -> None:
         """Keep an iterate if its residual is the least, and not NaN."""
         if residual < self._least:
-            self.found, self._least = iterate, residual
+            self.iterate, self._least = iterate, residual
 
 
 @dataclass

@@ -113,8 +113,8 @@ class SemismoothNewton:
             if rejected:
                 state = replace(previous.state, secant_at=None)
                 monitor.evaluate(state)
-            if (found := monitor.ended()) is not None:
-                return found
+            if (ended := monitor.ended()) is not None:
+                return ended
             if give_up and previous.state.active_set is None:
                 if _overestimates_stiffness(problem, step.parameters.c, state):
                     return state, monitor.outcome(OVERESTIMATED)
@@ -175,8 +175,8 @@ class ConvergenceMonitor:
         state = self.iterate.state
         if self.converged:
             return state, self.outcome()
-        if (found := self._loss_of_contact(state)) is not None:
-            return found
+        if (lost := self._loss_of_contact(state)) is not None:
+            return lost
         self._pressed = max(self._pressed, self._largest_pressure(state))
         if not np.isfinite(self.residuals.significant):
             return state, self.outcome("Newton's method diverged")
@@ -217,13 +217,13 @@ class ConvergenceMonitor:
             return None
         if counts[1] + counts[2] > 0 and self._largest_pressure(state) > tolerance * self._pressed:
             return None
-        found = undeformed_equilibrium(self._problem, tolerance)
-        if found is None:
+        evaluated = undeformed_equilibrium(self._problem, tolerance)
+        if evaluated is None:
             return None
         undeformed = replace(
-            found.state, active_set=state.active_set, layer_pressure=state.layer_pressure
+            evaluated.state, active_set=state.active_set, layer_pressure=state.layer_pressure
         )
-        self.iterate = replace(found, state=undeformed)
+        self.iterate = replace(evaluated, state=undeformed)
         self._semismooth.see(undeformed, self.residuals)
         words = f"{self._note} zero displacement".strip()
         self._semismooth.recorder.record(self.residuals, words, inner=0)

@@ -162,8 +162,8 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Sto
 @contextmanager
 def ending_on_signal() -> Iterator[None]:
     """End a run by an exception at a signal, in place of Python's own handlers."""
-    own = signal.SIG_DFL, signal.default_int_handler
-    with _handled(RunEnding(), lambda old: old in own):
+    defaults = signal.SIG_DFL, signal.default_int_handler
+    with _handled(RunEnding(), lambda old: old in defaults):
         yield
 
 

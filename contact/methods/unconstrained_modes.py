@@ -52,7 +52,7 @@ class RigidMotion:
     motions: Array  #: modes in the unknowns of the whole problem, (unknowns, m)
     columns: Array  #: modes in the jumps, (n, d, m)
     wanted: Array  #: amounts for the displacements of least norm, (m,)
-    amounts: Array  #: the same where nothing may penetrate, (m,)
+    amounts: Array  #: the same under the condition of no penetration, (m,)
     depth: float  #: penetration with `wanted` (length)
     limited: bool  #: whether `depth` is more than rounding
 
@@ -105,8 +105,8 @@ class UnconstrainedModes:
         if not missing <= 1:
             return False
         friction = (1 + missing) * weight * bound
-        found = [sliding_mode(group, time, friction) for group in self._unsupported]
-        return any(mode is not None for mode in found)
+        sliding = [sliding_mode(group, time, friction) for group in self._unsupported]
+        return any(mode is not None for mode in sliding)
 
     @cached_property
     def _unsupported(self) -> list[Group]:
@@ -128,15 +128,15 @@ class UnconstrainedModes:
         for _ in range(2):  # each leaves an error of sqrt(EPS)
             increment = step.operator.solve(-residual_forces(problem, state))
             state = replace(state, x=problem.body.updated(state.x, increment))
-        found = self.free_motion(problem, state)
-        if found is None:
+        motion = self.free_motion(problem, state)
+        if motion is None:
             return None
-        further = found.columns @ (found.amounts - found.wanted)
-        way = nodes.maximum(np.linalg.norm(further, axis=1))
-        if not way**2 <= 2 * found.depth**2:  # more than 45 degrees off the normal
+        further = motion.columns @ (motion.amounts - motion.wanted)
+        distance = nodes.maximum(np.linalg.norm(further, axis=1))
+        if not distance**2 <= 2 * motion.depth**2:  # more than 45 degrees off the normal
             return None
         moved = np.zeros((state.x.size // nodes.block_size, nodes.block_size))
-        moved[nodes.nodes, : nodes.dim] = found.columns @ found.amounts
+        moved[nodes.nodes, : nodes.dim] = motion.columns @ motion.amounts
         return replace(state, x=state.x - moved.ravel())
 
     def free_motion(self, problem: AnyProblem, state: State) -> RigidMotion | None:
@@ -188,8 +188,8 @@ class UnconstrainedModes:
         """
         if not problem.interface.friction.acts or self.constrained_by_supports:
             return False
-        found = self.free_motion(problem, state)
-        return found is not None and found.limited
+        motion = self.free_motion(problem, state)
+        return motion is not None and motion.limited
 
 
 def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array, Array]:
@@ -229,10 +229,10 @@ def with_least_displacements(
         if residuals.excess(outcome.allowed):
             return state, outcome
         state, outcome = free, replace(outcome, residuals=residuals)
-    found = modes.free_motion(problem, state)
-    if found is None:
+    free_motion = modes.free_motion(problem, state)
+    if free_motion is None:
         return state, outcome
-    x = body.updated(state.x, -found.motion)
+    x = body.updated(state.x, -free_motion.motion)
     # Contact forces that are rounding are out of balance after the motion.
     for forces in (Multipliers.zero(problem.interface.nodes), state.forces):
         least = replace(state, x=x, forces=forces)

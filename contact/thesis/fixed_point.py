@@ -146,10 +146,10 @@ class OuterLoop(ABC):
                 break
         else:
             ended = f"not converged in {options.max_outer} outer iterations{self._advice()}"
-        if best.found is not None and not by_thesis:
-            if rest := undeformed_equilibrium(problem, options.tolerance):
-                best.found, ended = rest, ""
-            self.state, residuals = best.found.state, best.found.residuals
+        if best.iterate is not None and not by_thesis:
+            if undeformed := undeformed_equilibrium(problem, options.tolerance):
+                best.iterate, ended = undeformed, ""
+            self.state, residuals = best.iterate.state, best.iterate.residuals
         return self._outcome(residuals, ended)
 
     def _update_bound(self, iteration: int) -> float:
@@ -169,8 +169,8 @@ class OuterLoop(ABC):
     def _thesis_criterion(self, change: float, previous: State) -> bool:
         """Tell whether (4.38) or (6.40) is met, on the change of the unknowns in L2(Omega)."""
         assert self._norm is not None
-        own = self.problem.body.owned_part
-        now, before = own(self.state.x), own(previous.x)
+        owned_part = self.problem.body.owned_part
+        now, before = owned_part(self.state.x), owned_part(previous.x)
         return self._norm(now - before) < self.options.eps_fp * self._norm(now)
 
     def _outcome(self, residuals: Residuals, ended: str = "", criterion: str = "") -> Outcome:
@@ -213,8 +213,8 @@ class FixedPoint(OuterLoop):
     def __post_init__(self) -> None:
         """Choose r and set up the operator."""
         super().__post_init__()
-        given = self.options.r
-        self.r = self.problem.scales.c if given == "auto" else given
+        r = self.options.r
+        self.r = self.problem.scales.c if r == "auto" else r
         # Whether r is fitted, once for all load steps: from nearby they would stall with another.
         self._fitted: bool | None = None
         self.operator = self._new_operator(symmetric=True)

@@ -143,8 +143,8 @@ class PenalisedProblem:
             symmetric=symmetric, counters=counters, solver=options.linear
         )
         # Global unknowns are on the first rank, behind its own ones.
-        self._here = self._body.global_unknowns.size if problem.comm.rank == 0 else 0
-        size = (self._body.owned + self._here, None)
+        self._local_globals = self._body.global_unknowns.size if problem.comm.rank == 0 else 0
+        size = (self._body.owned + self._local_globals, None)
         matrix = PETSc.Mat().createPython((size, size), self, problem.comm)
         matrix.setUp()
         self._iterate, self._residual = matrix.createVecs()
@@ -163,18 +163,18 @@ class PenalisedProblem:
         # Full steps find the active set in a few iterations; a line search on the residual, with
         # kinks of size 1/eps, takes tiny steps. With a layer that saturates, or implicit friction,
         # full steps cycle.
-        given = PETSc.Options()
+        database = PETSc.Options()
         name = "penalty_snes_linesearch_type"
-        default = not given.hasName(name)
+        default = not database.hasName(name)
         if default:
             layer = problem.interface.foundation.layer
-            given[name] = "basic" if symmetric and (layer is None or layer.lagged) else "bt"
+            database[name] = "basic" if symmetric and (layer is None or layer.lagged) else "bt"
         try:
             with petsc_options("penalty_"):
                 self.snes.setFromOptions()
         finally:
             if default:
-                given.delValue(name)
+                database.delValue(name)
 
     def set_load_step(self, problem: ContactProblem, eps: Regularisation) -> None:
         """Take another load step of the same problem."""
@@ -184,8 +184,8 @@ class PenalisedProblem:
         """Solve with the operator: the preconditioner of SNES's KSP."""
         try:
             self._poll()
-            found = self.operator.solve(self._units * self._unpacked(rhs.array_r))
-            solution.array[:] = self._packed(found)
+            increment = self.operator.solve(self._units * self._unpacked(rhs.array_r))
+            solution.array[:] = self._packed(increment)
         except (InputError, Interrupted) as error:
             # PETSc would wrap the error; SNES stops at NaN.
             self._error = error
@@ -199,12 +199,12 @@ class PenalisedProblem:
 
     def _packed(self, values: Array) -> Array:
         """Return the entries of PETSc's vectors on this rank of owned and global values."""
-        return values[: self._body.owned + self._here]
+        return values[: self._body.owned + self._local_globals]
 
     def _unpacked(self, values: Array) -> Array:
         """Return owned values and global ones behind them, the same on all ranks. Collective."""
-        own, first = np.split(values, [self._body.owned])
-        return np.concatenate([own, self._problem.comm.bcast(first)])
+        nodal, first = np.split(values, [self._body.owned])
+        return np.concatenate([nodal, self._problem.comm.bcast(first)])
 
     def solve(
         self, law: PenalisedLaw, state: State, implicit: bool, poll: Callable[[], None]

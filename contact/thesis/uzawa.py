@@ -231,8 +231,8 @@ class FrozenProblem:
 
         def derivative(flat: Array, directions: Array) -> Array:
             columns = directions.reshape(*shape, directions.shape[1])
-            found = self.projection_derivative(flat.reshape(shape), bound, columns)
-            return found.reshape(directions.shape)
+            slopes = self.projection_derivative(flat.reshape(shape), bound, columns)
+            return slopes.reshape(directions.shape)
 
         return ResidualMinimiser(inner, project, derivative, depth)
 
@@ -255,9 +255,9 @@ class ThesisCriterion:
         if before is None:
             return False, None
         norm, on_contact = self.domain_norm, self.frozen.nodes.norm
-        own = self.frozen.problem.body.owned_part(self.frozen.state.x)
+        displacement = self.frozen.problem.body.owned_part(self.frozen.state.x)
         change = norm(increment - before[0]) ** 2 + on_contact(phi - before[1]) ** 2
-        size = norm(own + increment) ** 2 + on_contact(phi) ** 2
+        size = norm(displacement + increment) ** 2 + on_contact(phi) ** 2
         return change < self.eps**2 * size, float(np.sqrt(change / size)) if size > 0 else 0.0
 
 

@@ -314,10 +314,10 @@ def test_the_least_residual_is_the_best_and_no_number_is_none():
     best: Best[str] = Best()
     for name, residual in (("lost", np.nan), ("far", np.inf)):
         best.see(name, residual)
-    assert best.found is None
+    assert best.iterate is None
     for name, residual in (("a", 0.5), ("b", 0.1), ("c", 0.2), ("d", np.nan)):
         best.see(name, residual)
-    assert best.found == "b"
+    assert best.iterate == "b"
 
 
 @pytest.mark.parametrize("factor", [3.0, np.nan], ids=["worse", "no numbers"])
