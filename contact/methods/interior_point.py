@@ -328,7 +328,9 @@ def interior_point(
             jump
         ):
             break
-        if modes.overloaded(bound, interface.pressure(jump, state.forces)):
+        # Pressures in a nonlinear body may be far from the loads, as beyond its limit load.
+        pressure = interface.pressure(jump, state.forces)
+        if problem.body.linear and modes.overloaded(bound, pressure):
             outcome = replace(outcome, residuals=evaluate(problem, state))
             last, outcome = state, replace(outcome, ended=OVERLOADED, overloaded=True)
             break

@@ -34,7 +34,9 @@ from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.history import HistoryLaw
+from forms.j2 import J2
 from forms.monotonicity import check_monotonicity
+from forms.plane_stress import PlaneStressHistory
 
 logger = logging.getLogger("contact.solve")
 
@@ -133,6 +135,7 @@ def review(solution: Solution) -> None:
         "supports": meeting_supports(problem, times),
         "unresisted-motion": bodies.unresisted_motions(solution),
         "not-held": bodies.not_held(solution),
+        "limit-load": limit_load(solution),
     }.items():
         for text in remarks:
             listed = solution.notes if isinstance(text, Note) else solution.warnings
@@ -238,6 +241,21 @@ def rounding(solution: Solution) -> Iterator[Remark]:
     if not moved and much.any():
         worst = np.max(left[much] / acting[much])
         yield f"{worst:.1e} of loads and contact forces are out of balance: {larger}"
+
+
+def limit_load(solution: Solution) -> Iterator[Remark]:
+    """Tell that a body without hardening has a limit load, where a method fails."""
+    laws = [material.law for material in solution.problem.description.materials]
+    laws = [law.base if isinstance(law, PlaneStressHistory) else law for law in laws]
+    perfect = any(
+        isinstance(law, J2) and not law.kinematic and law.strength(np.ones(1)) == law.yield_stress
+        for law in laws
+    )
+    if perfect and not solution.converged:
+        yield (
+            'a material with law = "j2" has no hardening, and the loads may be more than the limit '
+            "load; accepted: smaller loads, or material.hardening"
+        )
 
 
 def several_solutions(solution: Solution) -> Iterator[Remark]:

@@ -12,6 +12,8 @@ from mpi4py import MPI
 from contact import Solution, build_problem, parse_case, solve
 from contact.mesh.domain import Domain
 from contact.mesh.grid import rectangle
+from contact.methods.interior_point import interior_point
+from contact.methods.newton import Newton
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import groups, sliding_mode
 from contact.results.remarks import untouched
@@ -213,3 +215,41 @@ def test_a_block_at_a_wall_is_held_or_not(dim):
     # Where the method stopped no node may touch: a foundation too far away is not the cause then.
     open_nodes = (replace(found, state=found.problem.start()) for found in (lost, held))
     assert [len(list(untouched(found))) for found in open_nodes] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    "material",
+    [{"law": "j2", "yield_stress": 5e-4}, {"law": "log", "yield_strain": 1e-3}, {"law": "linear"}],
+)
+def test_limit_analysis_of_friction_is_of_linear_bodies(material):
+    """Of a plastic belt beyond its limit load it was said that friction cannot hold it."""
+    case = wall(2, 1.01)
+    tables = case.model_dump(exclude_unset=True)
+    tables["material"] = {"young": 1.0, "poisson": 0.0, **material}
+    problem = build_problem(parse_case(tables), MPI.COMM_SELF)
+    _, outcome = interior_point(Newton(problem).semismooth)
+    assert not outcome.converged
+    assert outcome.overloaded == (material["law"] == "linear")
+
+
+def test_a_body_without_hardening_is_said_to_have_a_limit_load():
+    """A strip that friction would hold is pulled with more than its yield stress, or with less."""
+    said = {}
+    for tension in (16.0, 12.0):
+        case = parse_case({
+            "mesh": {"generator": "rectangle", "size": [8.0, 1.0], "cells": [8, 1]},
+            "space": {"kinematics": "plane_stress"},
+            "material": {"law": "j2", "young": 1e4, "poisson": 0.0, "yield_stress": 15.0},
+            "load": [
+                {"on": "top", "traction": [0.0, -5.0]},
+                {"on": "right", "traction": [tension, 0.0]},
+            ],
+            "contact": {"on": "bottom"},
+            "friction": {"law": "coulomb", "mu": 0.5},
+            "solver": {"max_outer": 5},
+        })  # fmt: skip
+        solution = solve(case)
+        assert solution.converged == (tension < 15.0)
+        said[tension] = [text for text in solution.warnings if "[limit-load]" in text]
+        assert not any("[not-held]" in text for text in solution.warnings)
+    assert len(said[16.0]) == 1 and not said[12.0]
