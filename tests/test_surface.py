@@ -21,8 +21,6 @@ ANYTHING = {
     "Solution.movements: return": "tables as in summary.json, of numbers and lists",
     "Solution: source": "the Case, whose module is above that of results",
     "make_material: keys": "keys of a table, in which there are lists and tables",
-    "Material.__init__: keys": "the same",
-    "Contact.__init__: keys": "the same",
 }
 
 #: Types that say nothing of what is in them.

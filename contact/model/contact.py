@@ -32,7 +32,7 @@ from contact.settings import (
     Words,
     fault,
 )
-from contact.typing import Array, TableValue
+from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor
 
 #: A table, by the name of its shape, or an object with `measure`.
@@ -149,8 +149,16 @@ class Contact(Described):
         name: str | None = None,
         *,
         electric: Electric | Conductor | None = None,
+        rigid: Motion | None = None,
         law: Literal["signorini", "compliance"] | None = None,
-        **keys: TableValue | Array | Motion | None,
+        direction: Literal["foundation", "body", "axis"] = "foundation",
+        axis: Sequence[float] | Array | None = None,
+        overlap: Literal["refuse", "press"] = "refuse",
+        stiffness: float = 10.0,
+        limit: float = 0.1,
+        potential_factor: float = 2.0,
+        potential_range: float = 128.0,
+        lagged: bool = False,
     ) -> None:
         expect("Contact: press", press, "True or False", isinstance(press, bool | np.bool_))
         fits = isinstance(layer, Layer | float | int | None)
@@ -162,13 +170,26 @@ class Contact(Described):
             gap, foundation = one_of("Contact", foundation=foundation, gap=gap), None
         if isinstance(gap, float) and np.isinf(gap):  # which is no value of a field
             gap, foundation = None, GapFunction.of(gap)
-        given: dict[str, Any] = {**keys, "law": law or "signorini"}
-        if layer is not None:
-            given |= {"law": law or "compliance", "layer": layer}
-        if press:
-            given["overlap"] = "press"
-        given |= {"foundation": foundation, "gap": gap, "friction": friction, "electric": electric}
-        super().__init__(on=on, against=against, name=name, **given)
+        super().__init__(
+            on=on,
+            name=name,
+            law=law or ("signorini" if layer is None else "compliance"),
+            against=against,
+            gap=gap,
+            foundation=foundation,
+            direction=direction,
+            axis=axis,
+            overlap="press" if press else overlap,
+            rigid=rigid,
+            layer=0.0 if layer is None else layer,
+            stiffness=stiffness,
+            limit=limit,
+            potential_factor=potential_factor,
+            potential_range=potential_range,
+            lagged=lagged,
+            friction=friction,
+            electric=electric,
+        )
 
     @model_validator(mode="before")
     @classmethod

@@ -10,13 +10,14 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 import numpy as np
 from dolfinx.fem import Function
 from numpy.typing import NDArray
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, Tag, ValidationError, model_validator
 
 from contact.arguments import CONSTANTS as NUMBERS
 from contact.arguments import expect, is_law, several
 from contact.errors import InputError, shown
 from contact.library.materials import PACKAGED, Entry, find
 from contact.model import fields
+from contact.model.messages import describe
 from contact.model.section import (
     Axis,
     Described,
@@ -259,9 +260,32 @@ class Material(Described):
         piezo: PiezoTensors | Mapping[str, float | Array | Sequence[Sequence[float]]] | None = None,
         on: str | Sequence[str] = (),
         factor: fields.Static | None = None,
-        **keys: TableValue | Array | None,
+        *,
+        name: str | None = None,
+        units: str | Mapping[str, str] | None = None,
+        library: str | None = None,
+        young: float | None = None,
+        poisson: float | None = None,
+        stiffness: Array | Sequence[Sequence[float]] | None = None,
+        c11: float | None = None,
+        c12: float | None = None,
+        c13: float | None = None,
+        c33: float | None = None,
+        c44: float | None = None,
+        poling: float | Array | Sequence[float] | None = None,
+        yield_strain: float | None = None,
+        argument: Literal["norm", "square"] = "norm",
+        g_min: float = 0.0,
+        yield_stress: float | None = None,
+        hardening: float | Mapping[str, float] | Sequence[Sequence[float]] | None = None,
+        kinematic: float | Sequence[Mapping[str, float]] | None = None,
     ) -> None:
-        keys = {key: value for key, value in keys.items() if value is not None}
+        every: dict[str, Any] = {"name": name, "units": units, "library": library, "young": young}
+        every |= {"poisson": poisson, "stiffness": stiffness, "poling": poling}
+        every |= {"c11": c11, "c12": c12, "c13": c13, "c33": c33, "c44": c44}
+        every |= {"yield_strain": yield_strain, "argument": argument, "g_min": g_min}
+        every |= {"yield_stress": yield_stress, "hardening": hardening, "kinematic": kinematic}
+        keys = {key: value for key, value in every.items() if value is not None}
         fits = isinstance(law, str) or is_law(law)
         by_keys = law is None and {*keys} & {"name", "young", "poisson", "stiffness", "c11"}
         expect("law", law, OWN_LAW, fits or by_keys)
@@ -516,4 +540,7 @@ def make_material(dim: int, **keys: TableValue | Array) -> Material:
     >>> make_material(2, young=210e3, poisson=0.3).law
     Linear(young=210000.0, poisson=0.3)
     """
-    return Material(**keys).in_body(dim)  # type: ignore[arg-type]
+    try:
+        return Material.model_validate(keys).in_body(dim)
+    except ValidationError as error:
+        raise describe(error, "make_material") from None

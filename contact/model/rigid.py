@@ -228,11 +228,18 @@ class Rigid(Motion):
         on: str | Sequence[str],
         motion: Motion | None = None,
         foundation: bool = False,
-        **components: Given | GivenAmplitude,
+        *,
+        displacement: Sequence[GivenFree] | Array = (),
+        rotation: Given = (),
+        force: Sequence[GivenTimed] | Array = (),
+        moment: GivenTimed | Sequence[GivenTimed] | Array = (),
+        centre: Sequence[float] | Array = (),
+        amplitude: GivenAmplitude | None = None,
     ) -> None:
-        motion = Motion(**components) if motion is None else motion  # type: ignore[arg-type]
-        expect("Rigid: motion", motion, "Motion(...)", isinstance(motion, Motion))
-        Described.__init__(self, on=on, foundation=foundation, **dict(motion))
+        own = Motion(displacement, rotation, force, moment, centre, amplitude)
+        fits = motion is None or (isinstance(motion, Motion) and own == Motion())
+        expect("Rigid: motion", motion, "Motion(...), or its components", fits)
+        Described.__init__(self, on=on, foundation=foundation, **dict(motion or own))
 
 
 def numbers_at(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import textwrap
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, fields
 from functools import cache, partial, reduce, wraps
 from pathlib import Path
@@ -108,8 +108,7 @@ class Section(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _read_keys(cls, given: Any, info: ValidationInfo) -> Any:
-        own = {key for key, field in cls.model_fields.items() if field.exclude}
-        return with_known_keys(cls, given, own if info.context == IN_PYTHON else ())
+        return given if info.context == IN_PYTHON else with_known_keys(cls, given)
 
     @model_validator(mode="after")
     def _check_conditions(self) -> Self:
@@ -225,12 +224,12 @@ def called(title: Any, on: Any) -> str:
     return f"{title} on {on!r}" if on else str(title)
 
 
-def with_known_keys(of: Any, given: Any, internal: Collection[str] = ()) -> Any:
+def with_known_keys(of: Any, given: Any) -> Any:
     """Return a table, if it has no unknown key, and all that are required."""
     if isinstance(given, Mapping):
         known = keys_of(of)
         for key in given:
-            if key not in known and key not in internal:
+            if key not in known:
                 raise unknown(key, known, getattr(of, "hints", {}).get(key, ""))
         for key, info in known.items():
             if info.is_required() and key not in given:

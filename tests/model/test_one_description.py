@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,7 @@ from contact import (
     solve,
 )
 from contact.model.evolution import Amplitude, Evolution
+from contact.model.messages import keys_of
 from forms.laws import Compliance, PotentialFactor, Truncation
 from tests.problems.put_together import block
 
@@ -122,3 +125,9 @@ def test_the_potential_of_a_foundation_in_time() -> None:
     ):
         conductor = electric.conductor(domain, "bottom")
         assert tuple(conductor.at(time).phi_f for time in (0.25, 1.0)) == pytest.approx(values)
+
+
+def test_the_arguments_of_a_material_are_its_keys() -> None:
+    """A key that `__init__` lacks would be one of the case file alone."""
+    arguments = {*inspect.signature(Material.__init__).parameters} - {"self", "factor"}
+    assert arguments == {*keys_of(Material)}

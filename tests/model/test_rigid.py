@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from contact import Motion, Rigid
+from contact import InputError, Motion, Rigid
 from contact.case.file import parse_case, to_toml
 from contact.model.rigid import numbers_at
 from tests.problems.bar import changed
@@ -73,3 +73,8 @@ def test_a_free_rotation():
     turning = Motion([0.0, "free"], None, moment="2*t", centre=[0.0, 0.0])
     assert turning.filled(2).values[1:] == (None, None)
     assert numbers_at(turning.moments, None, 0.5).tolist() == [1.0]
+
+
+def test_a_motion_and_its_components_are_one_or_the_other():
+    with pytest.raises(InputError, match=r"Rigid: motion: given .*accepted: .*or its components"):
+        Rigid("top", Motion([0.0, "free"]), displacement=[0.1, 0.0])
