@@ -190,23 +190,33 @@ def _arrows(parts: list[Part], boundary: Array) -> list[tuple[Array, Array]]:
     for kind, (_, _, places, vectors) in zip(kinds, parts, strict=True):
         sizes = np.linalg.norm(vectors, axis=1)
         most, on_part = sizes.max(initial=0.0), kind[1]
-        chosen = _spread(places, round(ARROWS ** (1 / (places.shape[1] - on_part))))
-        chosen = chosen[sizes[chosen] > 0.02 * most]
+        chosen, centres = _spread(places, round(ARROWS ** (1 / (places.shape[1] - on_part))))
+        drawn = sizes[chosen] > 0.02 * most
+        chosen, centres = chosen[drawn], centres[drawn]
         scale = reach * max(1 / largest[kind], SHORTEST / most) if most else 0.0
-        start, step = places[chosen], scale * vectors[chosen]
-        pushes = np.einsum("ni,ni->n", step, start - middle) <= 0
-        behind = np.where(on_part, pushes, 0.5)
-        found.append((start - behind[:, None] * step, step))
+        if on_part:
+            start, step = places[chosen], scale * vectors[chosen]
+            pushes = np.einsum("ni,ni->n", step, start - middle) <= 0
+            found.append((start - pushes[:, None] * step, step))
+        else:
+            step = 0.5 * scale * vectors[chosen]
+            found.append((centres - 0.5 * step, step))
     return found
 
 
-def _spread(places: Array, count: int) -> Indices:
-    """Return the places nearest to the centres of those cells of a grid that have some."""
+def _spread(places: Array, count: int) -> tuple[Indices, Array]:
+    """Return the centres of those cells of a grid that have places, and the nearest of these.
+
+    `count` cells lie along the longest side of the grid.
+    """
     if not len(places):
-        return np.empty(0, dtype=np.int32)
-    low, size = places.min(axis=0), float(np.ptp(places, axis=0).max()) or 1.0
-    cells = np.unique(np.clip(np.floor(count * (places - low) / size), 0, count - 1), axis=0)
-    return np.unique(KDTree(places).query(low + (cells + 0.5) / count * size)[1])
+        return np.empty(0, dtype=np.int32), places
+    low, extent = places.min(axis=0), np.ptp(places, axis=0)
+    counts = np.maximum(1, np.round(count * extent / (extent.max() or 1.0)))
+    size = extent / counts
+    cells = np.floor((places - low) / np.where(size > 0, size, 1.0))
+    centres = low + (np.unique(np.clip(cells, 0, counts - 1), axis=0) + 0.5) * size
+    return KDTree(places).query(centres)[1], centres
 
 
 def _draw_plane(
@@ -245,6 +255,7 @@ def _draw_plane(
         ax.fill([], [], facecolor="none", edgecolor=BLUE, hatch="//////", lw=0, label="foundation")
     ax.set_aspect("equal")
     ax.autoscale_view()
+    figure.set_figheight(np.clip(1.4 + 5.9 * ax.dataLim.height / ax.dataLim.width, 2.4, 5.0))
 
 
 def _draw_space(
