@@ -287,7 +287,7 @@ def missed(
 ) -> Iterator[Remark]:
     """Say that the error that was asked for has not been reached, or that a mesh was refused."""
     error = rows[-1]["error"] if rows else 0.0
-    short = asked.error is not None and error > asked.error
+    short = asked.error is not None and not error <= asked.error  # a load may be NaN there
     if short or refused is not None:
         goal = f", and mesh.adapt.error = {asked.error:g}" if short else ""
         ended = "would have more unknowns than mesh.adapt.max_unknowns"

@@ -93,13 +93,13 @@ class Estimate:
     def cells(self) -> Array:
         """eta_K of the owned cells over the same norm: the sum of its squares is `relative`^2."""
         whole = self.energy + self.total
-        return np.sqrt(self.squares / whole) if whole > 0 else np.zeros_like(self.squares)
+        return np.sqrt(self.squares / whole) if whole != 0 else np.zeros_like(self.squares)
 
     @property
     def relative(self) -> float:
         """The estimated error, normalised: sqrt(total / (energy + total))."""
         whole = self.energy + self.total
-        return float(np.sqrt(self.total / whole)) if whole > 0 else 0.0
+        return float(np.sqrt(self.total / whole)) if whole != 0 else 0.0
 
 
 def estimated(

@@ -14,8 +14,9 @@ from mpi4py import MPI
 
 from contact import parse_case, solve, write_outputs
 from contact.body.description import Body
-from contact.body.weak_form import Given
+from contact.body.weak_form import LoadDensity
 from contact.case.build import build_problem
+from contact.case.mesh import Adapt
 from contact.cli.check import expectations
 from contact.cli.solve import _results
 from contact.mesh.cells import rule, shape_of
@@ -30,7 +31,15 @@ from contact.model.contact import Contact
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.results.error_estimate import estimated, intervals, nodal_means, oscillation, sampled
+from contact.refining import missed
+from contact.results.error_estimate import (
+    Estimate,
+    estimated,
+    intervals,
+    nodal_means,
+    oscillation,
+    sampled,
+)
 from contact.results.fields import DerivedFields, fields_of
 from contact.results.local_problems import LocalProblems
 from forms.elasticity import isotropic, mandel
@@ -278,7 +287,7 @@ def test_a_load_of_a_new_kind_oscillates_as_the_weak_form_has_it(monkeypatch):
     def spinning(domain, body, time):
         x = ufl.SpatialCoordinate(domain.mesh)
         turns = fem.Constant(domain.mesh, 2.0) * ufl.as_vector([x[0] ** 2, 0.0])
-        return {"body_force": [Given(turns, domain.dx, None, lambda t: t / 2, False)]}
+        return {"body_force": [LoadDensity(turns, domain.dx, None, lambda t: t / 2, False)]}
 
     plain = changed(load=[{"everywhere": True, "body_force": ["x**2", 0.0]}])
     expected = oscillation(build_problem(parse_case(plain)), 1.0)
@@ -553,3 +562,14 @@ def test_exact_solutions_do_not_lock(sides):
     assert solution.error.stiffness_ratio > 1000
     assert solution.error.relative < 1e-6
     assert not says(solution)
+
+
+def test_an_error_that_is_no_number_meets_no_goal():
+    """A load may be NaN at the points of the estimate alone."""
+    estimate = Estimate(
+        np.array([np.nan]), contact=0.0, energy=1.0, total=np.nan, stiffness_ratio=None
+    )
+    assert np.isnan(estimate.relative) and np.isnan(estimate.cells).all()
+    rows = [{"error": estimate.relative}]
+    (remark,) = missed(Adapt(error=0.1), rows, refused=None)
+    assert "mesh.adapt.error = 0.1" in remark
