@@ -245,8 +245,9 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
     if not solution.outcome.signal:
         check_presses(solution.problem)
     solution.adaptation = rows
-    remarks = missed(asked, rows if solution.converged else (), refused)
-    solution.warnings += [f"{text} [adapt]" for text in remarks]
+    reached = rows if solution.converged else ()
+    for identifier, remarks in {"adapt": missed(asked, reached, refused)}.items():
+        solution.warnings += [f"{text} [{identifier}]" for text in remarks]
     if asked.fraction == 1 and solution.converged:
         solution.intervals = intervals(rows)
     return solution

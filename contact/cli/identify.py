@@ -49,8 +49,10 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 def _check_free(path: Path | None) -> None:
     """Refuse a figure that would replace a file, or that nothing could draw."""
     if path is not None:
+        if path.exists():
+            raise InputError(f"--plot {path}: it exists; accepted: a new file", "plot-file")
         accepted = f"a new file, {', '.join(f'.{ending}' for ending in FORMATS)}, in a folder"
-        fits = path.suffix[1:] in FORMATS and path.parent.is_dir() and not path.exists()
+        fits = path.suffix[1:] in FORMATS and path.parent.is_dir()
         expect("--plot", str(path), accepted, fits, "plot-file")
 
 

@@ -23,7 +23,7 @@ from contact.model.section import (
     Described,
     Either,
     FactorOfTime,
-    Few,
+    FewTimed,
     Free,
     Part,
     Timed,
@@ -42,11 +42,11 @@ GivenFree: TypeAlias = GivenTimed | Literal["free"] | None
 Given: TypeAlias = GivenFree | Sequence[GivenFree] | Array
 
 Components: TypeAlias = Annotated[
-    Few[FreeTimed],
+    FewTimed[FreeTimed],
     Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula in t or "free"'),
 ]
 Forces: TypeAlias = Annotated[
-    Few[Timed], Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D")
+    FewTimed[Timed], Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D")
 ]
 #: Prefix of a formula in degrees that is in radians.
 DEGREES = "pi/180*("

@@ -361,6 +361,14 @@ def _components(given: Any) -> Any:
     return tuple(given) if isinstance(given, list) else given
 
 
+def _in_time(given: Any, info: ValidationInfo) -> Any:
+    """Return the components, functions of time with their names in messages."""
+    given, name = _components(given), f"{_named(info)}: {info.field_name}"
+    if not isinstance(given, tuple):
+        return given
+    return tuple(OfTime(v, f"{name}.{k}") if callable(v) else v for k, v in enumerate(given))
+
+
 as_tuple = BeforeValidator(_components)
 
 
@@ -368,12 +376,13 @@ class Spatial(tuple[One, ...]):
     """A list of one entry a dimension."""
 
 
-#: Components of a vector, in 2-D or 3-D, given as a list. A list of one or more (`Some`). One
-#: value, or a list of another type (`Either`), or of the same one (`OneOrSome`: [contact] or
-#: [[contact]]).
+#: Components of a vector, in 2-D or 3-D, given as a list; in Python a function of the time too
+#: (`FewTimed`). A list of one or more (`Some`). One value, or a list of another type (`Either`),
+#: or of the same one (`OneOrSome`: [contact] or [[contact]]).
 Few: TypeAlias = Annotated[
     tuple[One, ...], Bounds(min_length=2, max_length=3), as_tuple, AfterValidator(Spatial)
 ]
+FewTimed: TypeAlias = Annotated[Few[One], BeforeValidator(_in_time)]
 Some: TypeAlias = Annotated[tuple[One, ...], Bounds(min_length=1), as_tuple]
 Either: TypeAlias = Annotated[
     Annotated[One, Tag(":one")] | Annotated[Many, Tag(":many")], one_or_many

@@ -208,7 +208,7 @@ def test_tightened_in_steps_its_work_is_stored():
 
 
 WRONG = {
-    "both": ({"force": 1.0, "shortening": 1.0}, {}, r"bolt\.0\.force.*\[bolt\]"),
+    "both": ({"force": 1.0, "shortening": 1.0}, {}, r"bolt\.0\.shortening.*\[bolt\]"),
     "neither": ({}, {}, r"bolt\.0\.force.*\[bolt\]"),
     "a side": ({"on": "top", "force": 1.0}, {}, r"\[bolt\]"),
     "half a section": (

@@ -143,7 +143,7 @@ def of_half_ellipses(cell, order, axis, counts, depth):
 @pytest.mark.parametrize("cell", [*PLANE, "hexahedron"])
 def test_curved_cells_that_turn_are_accepted(cell):
     """Edges of a body are where normals at the ends of its facets differ, not those of chords."""
-    for counts in ((4, 5), (5, 9), (4, 13)) if cell in PLANE else ((4, 7),):
+    for counts in ((4, 5), (5, 9), (4, 13)) if cell in PLANE else ((5, 9),):
         for axis in (0.5, 0.35):
             for depth in (0.0, 0.3 / min(counts)):
                 check_refused(of_half_ellipses(cell, 2, axis, counts, depth), depth, 2.0)
