@@ -96,8 +96,9 @@ def _parts(case: Case, problem: ContactProblem) -> Iterator[Part]:
         return _corners(domain, domain.facets_anywhere(part))
 
     def named(section: Any, words: str, fields: Iterable[Any]) -> str:
+        amplitude = f", amplitude {section.amplitude}" if section.amplitude else ""
         formula = f", t = {time:g}" if case.evolution and knows_time([*fields]) else ""
-        return words + (f", amplitude {section.amplitude}" if section.amplitude else formula)
+        return words + amplitude + formula
 
     def components(fields: Iterable[tuple[int, Any]], places: Array) -> Array:
         found = np.zeros_like(places)
@@ -239,7 +240,9 @@ def _draw_plane(
         ax.add_collection(lines)
         if start.size:
             exact: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
-            ax.quiver(*start.T, *step.T, color=f"C{k}", width=0.003, **exact)
+            # Of narrow axes a share of the width would be a hair.
+            exact |= {"units": "inches", "width": 0.018}
+            ax.quiver(*start.T, *step.T, color=f"C{k}", **exact)
             ax.update_datalim(np.concatenate([start, start + step]))
     places, normal = _in_front(boundary, surface)
     size = np.ptp(boundary, axis=(0, 1)).max()
