@@ -52,7 +52,7 @@ from pydantic_core import core_schema
 from ufl.core.expr import Expr
 
 from contact.arguments import OfTime, shorten
-from contact.errors import InputError, shown
+from contact.errors import InputError, nearest, shown
 from contact.mesh.domain import PART_ACCEPTED, part_name
 from contact.model.fields import (
     CONSTANT,
@@ -332,6 +332,13 @@ def _named(info: ValidationInfo) -> str:
     return called((info.config or {}).get("title"), info.data.get("on"))
 
 
+def _free(given: Any) -> Any:
+    """Return "free" for None, and others as they are but for "free" misspelt, no formula."""
+    if isinstance(given, str) and given != "free" and nearest(given, ["free"]):
+        raise fault("", given, 'a number, a formula or "free"')
+    return "free" if given is None else given
+
+
 def _not_negative(expression: Any) -> Any:
     if isinstance(expression, Expression) and expression.is_constant and expression.value < 0:
         raise InputError(
@@ -469,7 +476,7 @@ Timed: TypeAlias = Annotated[
 Free: TypeAlias = Annotated[
     One | Literal["free"],
     OrOwn(lambda given: isinstance(given, str) and given == "free"),
-    BeforeValidator(lambda given: "free" if given is None else given),
+    BeforeValidator(_free),
 ]
 #: A name of an amplitude in words.
 NAMED = 'a name below evolution.amplitudes, or "constant"'

@@ -89,6 +89,9 @@ NEARLY = [
     ({"solver": {"method": "uzawa", "r": "atuo"}}, "auto"),
     ({"solver__method": "Penalty"}, "penalty"),
     ({"case": {"units": "N-mm-Mpa"}}, "N-mm-MPa"),
+    ({"fixed": [{"on": "left", "displacement": ["Free", 0.0]}]}, "free"),
+    ({"rigid": [{"on": "top", "displacement": [0.0, "fre"]}]}, "free"),
+    ({"rigid": [{"on": "top", "rotation": "FREE"}]}, "free"),
 ]
 
 
