@@ -18,18 +18,19 @@ from contact.case.file import Case
 from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
-from contact.mesh.geometry import area, facet_normals, geometry_nodes
+from contact.mesh.geometry import area, geometry_nodes, normals_at
 from contact.model.fields import at_time, knows_time
 from contact.plot.foundation import BEYOND, HATCHED, add_foundation, facing
 from contact.plot.run import polygons
 from contact.plot.space import Camera, drawable, render
 from contact.plot.style import BLUE, SKY, STYLE, heading
 from contact.problem.problem import ContactProblem
+from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
 #: A part: its name in the legend, its facets by their corners, (n, c, d), and the places and the
-#: vectors of a load or displacement, (m, d).
-Part: TypeAlias = tuple[str, Array, Array, Array]
+#: vectors of a load or displacement, and the unit normals out of the body there, all (m, d).
+Part: TypeAlias = tuple[str, Array, Array, Array, Array]
 
 #: About the most arrows of a load, the length of the longest over the extent of the body, and that
 #: of others over it at least.
@@ -61,8 +62,7 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
     around = facet_of(shape_of(domain.mesh).corners).around if domain.dim == 2 else []
     cells = gathered(geometry_nodes(domain)[:, around])
     parts: list[Part] = [
-        (words, gathered(facets), gathered(places), gathered(vectors))
-        for words, facets, places, vectors in _parts(case, problem)
+        (words, *map(gathered, arrays)) for words, *arrays in _parts(case, problem)
     ]
     surface = _foundation(problem)
     if comm.rank > 0:
@@ -95,6 +95,10 @@ def _parts(case: Case, problem: ContactProblem) -> Iterator[Part]:
     def facets(part: str) -> Array:
         return _corners(domain, domain.facets_anywhere(part))
 
+    def normals(part: str) -> Array:
+        found = normals_at(domain, domain.facets_anywhere(part), 1)[2].mean(axis=1)
+        return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+
     def named(section: Any, words: str, fields: Iterable[Any]) -> str:
         amplitude = f", amplitude {section.amplitude}" if section.amplitude else ""
         formula = f", t = {time:g}" if case.evolution and knows_time([*fields]) else ""
@@ -108,38 +112,34 @@ def _parts(case: Case, problem: ContactProblem) -> Iterator[Part]:
 
     none = np.empty((0, domain.dim))
     for contact in problem.contacts:
-        yield f"contact {contact.on}", facets(contact.on), none, none
+        yield f"contact {contact.on}", facets(contact.on), none, none, none
         if contact.against is not None:
-            yield f"against {contact.against}", facets(contact.against), none, none
+            yield f"against {contact.against}", facets(contact.against), none, none, none
     for fixed in case.fixed:
         corners = facets(fixed.on)
         places = corners.mean(axis=1)
         moved = components(fixed.components.items(), places)
         words = named(fixed, f"fixed {fixed.on}", fixed.given.values())
-        yield words, corners, places, moved
+        yield words, corners, places, moved, normals(fixed.on)
     for key in ("elastic", "bolt", "electrode", "rigid"):
         for section in getattr(case, key):
-            yield f"{key} {section.on}", facets(section.on), none, none
+            yield f"{key} {section.on}", facets(section.on), none, none, none
     for load in case.load:
         if load.on is None:
-            corners, places = (
-                none[:, None].repeat(domain.dim, axis=1),
-                geometry_nodes(domain).mean(axis=1),
-            )
+            corners = none[:, None].repeat(domain.dim, axis=1)
+            places = geometry_nodes(domain).mean(axis=1)
+            outward = np.zeros_like(places)
         else:
-            corners = facets(load.on)
+            corners, outward = facets(load.on), normals(load.on)
             places = corners.mean(axis=1)
         force = components(enumerate(load.density or ()), places)
         if load.force is not None:
             assert load.on is not None
             force += components(enumerate(load.force), places) / area(domain, load.on)
         if load.pressure is not None:
-            assert load.on is not None
-            normal = facet_normals(domain, load.on, 1)[2].mean(axis=1)
-            normal /= np.linalg.norm(normal, axis=1)[:, None]
-            force -= np.reshape(at_time(load.pressure, time).numpy(places), (-1, 1)) * normal
+            force -= np.reshape(at_time(load.pressure, time).numpy(places), (-1, 1)) * outward
         words = named(load, f"load {load.on or 'in the whole body'}", load.named.values())
-        yield words, corners, places, force
+        yield words, corners, places, force, outward
 
 
 def _corners(domain: Domain, facets: Indices) -> Array:
@@ -181,14 +181,14 @@ def _arrows(parts: list[Part], boundary: Array) -> list[tuple[Array, Array]]:
 
     Loads on parts have one scale, so have displacements, and so have loads in the whole body.
     """
-    reach, middle = REACH * np.ptp(boundary, axis=(0, 1)).max(), boundary.mean(axis=(0, 1))
+    reach = REACH * np.ptp(boundary, axis=(0, 1)).max()
     largest: dict[tuple[str, int], float] = {}
     kinds = [(words.partition(" ")[0], min(len(facets), 1)) for words, facets, *_ in parts]
-    for kind, (*_, vectors) in zip(kinds, parts, strict=True):
+    for kind, (*_, vectors, _) in zip(kinds, parts, strict=True):
         most = np.linalg.norm(vectors, axis=1).max(initial=0.0)
         largest[kind] = max(most, largest.get(kind, 0.0))
     found = []
-    for kind, (_, _, places, vectors) in zip(kinds, parts, strict=True):
+    for kind, (_, _, places, vectors, outward) in zip(kinds, parts, strict=True):
         sizes = np.linalg.norm(vectors, axis=1)
         most, on_part = sizes.max(initial=0.0), kind[1]
         chosen, centres = _spread(places, round(ARROWS ** (1 / (places.shape[1] - on_part))))
@@ -197,8 +197,8 @@ def _arrows(parts: list[Part], boundary: Array) -> list[tuple[Array, Array]]:
         scale = reach * max(1 / largest[kind], SHORTEST / most) if most else 0.0
         if on_part:
             start, step = places[chosen], scale * vectors[chosen]
-            pushes = np.einsum("ni,ni->n", step, start - middle) <= 0
-            found.append((start - pushes[:, None] * step, step))
+            pulls = np.einsum("ni,ni->n", step, outward[chosen]) > NEGLIGIBLE * reach
+            found.append((start - ~pulls[:, None] * step, step))
         else:
             step = 0.5 * scale * vectors[chosen]
             found.append((centres - 0.5 * step, step))

@@ -79,8 +79,15 @@ def facet_normals(
     The result has the cells of the facets, (f,), the numbers of these in their cells, (f,), and the
     vectors, (f, q, d), q = 1 for straight simplices.
     """
+    return normals_at(domain, domain.facets(part), degree)
+
+
+def normals_at(
+    domain: Domain, facets: Indices, degree: int
+) -> tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]], Array]:
+    """Return the same of facets of this rank; of those inside of the body out of one cell."""
     mesh, d, shape = domain.mesh, domain.dim, shape_of(domain.mesh)
-    cells, place = cells_at(mesh, domain.facets(part))
+    cells, place = cells_at(mesh, facets)
     x = mesh.geometry.x[_compat.geometry_dofmap(mesh)[cells]][:, :, :d]
     own = shape.facet_nodes(domain.order)[place]
     points = np.take_along_axis(x, own[:, :, None], axis=1)

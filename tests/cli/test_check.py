@@ -161,6 +161,21 @@ def test_the_arrows_of_a_pressure_are_outside_the_body(pressure, side):
     assert np.all(arrows.Y >= 2 - 1e-9) and np.all(arrows.Y + arrows.V >= 2 - 1e-9)
 
 
+@pytest.mark.parametrize("traction", [[1.0, -0.1], [-1.0, 0.1]])
+def test_oblique_arrows_are_outside_of_the_body(traction):
+    data = {
+        "mesh": {"generator": "rectangle", "size": [4.0, 2.0], "cells": [8, 4]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "top", "traction": traction}],
+        "contact": {"on": "bottom"},
+    }
+    case = parse_case(data)
+    collections = draw_setup(case, build_problem(case)).axes[0].collections
+    (arrows,) = (each for each in collections if isinstance(each, Quiver))
+    assert np.minimum(arrows.Y, arrows.Y + arrows.V) == pytest.approx(2.0)
+
+
 def test_tractions_forces_and_pressures_have_one_scale():
     """A force is spread over its part; loads in the whole body have arrows in it."""
     size = [4.0, 2.0]
