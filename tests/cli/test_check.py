@@ -145,34 +145,31 @@ def test_every_case_has_a_picture(name):
         assert np.all(arrows.U == 0) and np.all(arrows.V < 0) and np.all(arrows.Y > 1)
 
 
-@pytest.mark.parametrize(("pressure", "side"), [(0.1, 1.0), (-0.1, -1.0)])
-def test_the_arrows_of_a_pressure_are_outside_the_body(pressure, side):
+def arrows_on_top(**load):
+    """Return the arrows of a load on the upper side of a rectangle."""
     data = {
         "mesh": {"generator": "rectangle", "size": [4.0, 2.0], "cells": [8, 4]},
         "material": {"young": 1.0, "poisson": 0.3},
         "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "top", "pressure": pressure}],
+        "load": [{"on": "top", **load}],
         "contact": {"on": "bottom"},
     }
     case = parse_case(data)
     collections = draw_setup(case, build_problem(case)).axes[0].collections
     (arrows,) = (each for each in collections if isinstance(each, Quiver))
+    return arrows
+
+
+@pytest.mark.parametrize(("pressure", "side"), [(0.1, 1.0), (-0.1, -1.0)])
+def test_the_arrows_of_a_pressure_are_outside_the_body(pressure, side):
+    arrows = arrows_on_top(pressure=pressure)
     assert arrows.U == pytest.approx(0.0, abs=1e-12) and np.all(side * arrows.V < 0)
     assert np.all(arrows.Y >= 2 - 1e-9) and np.all(arrows.Y + arrows.V >= 2 - 1e-9)
 
 
 @pytest.mark.parametrize("traction", [[1.0, -0.1], [-1.0, 0.1]])
 def test_oblique_arrows_are_outside_of_the_body(traction):
-    data = {
-        "mesh": {"generator": "rectangle", "size": [4.0, 2.0], "cells": [8, 4]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "top", "traction": traction}],
-        "contact": {"on": "bottom"},
-    }
-    case = parse_case(data)
-    collections = draw_setup(case, build_problem(case)).axes[0].collections
-    (arrows,) = (each for each in collections if isinstance(each, Quiver))
+    arrows = arrows_on_top(traction=traction)
     assert np.minimum(arrows.Y, arrows.Y + arrows.V) == pytest.approx(2.0)
 
 

@@ -1,15 +1,17 @@
 """Layers beside or around each other whose meshes overlap, and what presses them apart."""
 
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from numpy.typing import ArrayLike
 
-from contact import Body, Fixed, Linear, Load
+from contact import Body, Contact, Fixed, InputError, Linear, Load, Problem
 from contact._compat import geometry_dofmap
 from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain, from_mesh, revolved
@@ -27,6 +29,19 @@ OFFSET = 0.45
 
 #: Ends of the layers, along x or the radius.
 RADII = (1.0, 1.5, 2.0)
+
+#: Degrees of geometry and displacements.
+ELEMENTS = ((1, 1), (1, 2), (2, 2))
+
+PLANE, SPACE = ("triangle", "quadrilateral"), ("tetrahedron", "hexahedron")
+
+
+def told(domain: Domain, given: Body, contact: Contact, degree: int = 1, words: str = "") -> float:
+    """Return the depth of the overlap for which a problem is refused."""
+    with pytest.raises(InputError, match=r"\[overlap\]") as raised:
+        Problem(domain, given, contact, degree=degree)
+    assert words in str(raised.value)
+    return float(re.search(r"by up to (\S+) more", str(raised.value))[1])
 
 
 def boxes(comm: MPI.Intracomm, cell: str, order: int, numbers: Sequence[Sequence[int]]) -> Mesh:
