@@ -6,9 +6,10 @@ Sign convention, stated once, equations (1.23) and (8.2), with the potential phi
     D     = e eps(u) - beta grad(phi),    D_i = e_ijk eps_jk - beta_ij phi_,j
 
 A of (5.16), with B of the fixed point, is positive definite and not symmetric: `saddle_form`, after
-the saddle-point problem of its two rows; B(x; x, x) = F eps : eps + beta grad(phi) . grad(phi).
+the saddle-point matrix [[F, e^T], [-e, beta]] of its rows. It has the quadratic form
+B(x; x, x) = F eps : eps + beta grad(phi) . grad(phi).
 A-check of (5.27), with B-check, is A with xi negated, symmetric and indefinite, its quadratic form
-convex in u and concave in phi: `symmetrised_form`.
+convex in u and concave in phi, with a saddle point as solution: `symmetrised_form`.
 
 With the outward normal, D.nu = q_2 on a charged part, div D = q_0 in the body and
 D.nu = psi(u_nu - rho) phi_L(phi - phi_F) on a conductive foundation. On the left-hand side of A

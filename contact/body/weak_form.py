@@ -7,10 +7,10 @@ that vanish where displacements and potentials are prescribed,
               = -int_Gamma_3 ((lambda_c + p_l) v_nu + lambda_f . v_tau - (D.nu) xi),
 
 with the pressure p_l of a layer. The first line is of this module, the second of
-`contact.interface`. That is (10) of docs/theory.md; with (11) it is (5.26) of the thesis, without a
-potential (3.9). Numbers of two parts, as these, are those of equations of the thesis. The test
-function of the potential is negated, so that the derivative of G_0 is symmetric. Loads are negative
-terms: G_0 = <F(x), z> - <f, z>. Stresses are those of `forms`.
+`contact.interface`. That is (10) of docs/theory.md; with (11) it is (5.26) of the thesis, with a
+layer (6.31), without a potential (3.9). Numbers of two parts, as these, are those of equations of
+the thesis. The test function of the potential is negated, so that the derivative of G_0 is
+symmetric. Loads are negative terms: G_0 = <F(x), z> - <f, z>. Stresses are those of `forms`.
 
 Measures, fields and laws in UFL are made by `contact.body.materials` and `contact.body.loads`;
 `contact.body.assembly` compiles the terms.

@@ -12,11 +12,12 @@ evaluates them. `linearise` linearises them node by node for a step of the semis
     lambda_f+ = lambda_f + gamma u_tau+        stick, (19b)
     lambda_f+ = s+ e + theta Q u_tau+          slip, (19c), with the linearised bound s+ (19d)
 
-These are lambda+ = lambda^0 + B T dx (19) with the increment dx of the step. With gamma far above
-the stiffness of the body (19a) and (19b) are nearly u_nu = rho and u_tau = 0, the conditions of the
-primal-dual active set strategy, and their residuals fall by that ratio in every step. The active
-set and the derivative of the bound by the slip are given: safeguards against cycling belong to the
-method (`contact.methods.safeguards`).
+These are lambda+ = lambda^0 + B T dx with the increment dx of the step. (19a) and (19b) perturb the
+derivative by c/gamma. With gamma far above the stiffness of the body they are nearly u_nu = rho and
+u_tau = 0, the conditions of the primal-dual active set strategy, and their residuals fall by that
+ratio in every step. Unlike that of Alart and Curnier the disc has the radius of lambda_c, not of
+lambda_c + c (u_nu - rho). The active set and the derivative of the bound by the slip are given:
+safeguards against cycling belong to the method (`contact.methods.safeguards`).
 
 References
 ----------
@@ -115,7 +116,7 @@ class ComplementarityParameters:
     nodal_stiffness
         kappa = 1.93 E'/h, an upper estimate of the stiffness of the body at one contact node.
     gamma
-        Penalty of the eliminated constraints, far above the others.
+        Augmentation parameter of (19), far above the others; the solution does not depend on it.
     """
 
     c: float

@@ -66,7 +66,7 @@ class Interface:
     size
         Largest extent of the body (length).
     elongation
-        Aspect ratio >= 1 of the cells behind Gamma_3 (`contact.mesh.entities.elongation`).
+        Depth over width, >= 1, of the cells behind Gamma_3 (`contact.mesh.entities.elongation`).
     component, components
         Connected component of each contact node, shape (n,), and their number
         (`contact.body.equilibrium`).
@@ -90,8 +90,8 @@ class Interface:
     def c_r(self) -> float:
         """Complementarity parameter c_r = elongation c_0 of the residuals (16) (stress/length).
 
-        Closing a gap at one node takes a stress of E/h: with stretched cells c_0 would hide errors
-        of the pressure far above the tolerance.
+        Behind facets that are short beside the depth of their cells a gap takes a stress far above
+        c_0 times it: errors of the pressure would be hidden.
         """
         return self.elongation * self.c_0
 
@@ -175,8 +175,8 @@ class Interface:
         """Return the friction bound s, shape (n,). Collective."""
         return self.friction.bound(self.pressure(jump, multipliers), self.slip_length(jump))
 
-    def stress(self, jump: Array, multipliers: Multipliers) -> Array:
-        """Return -sigma nu, layer included, shape (n, d)."""
+    def traction(self, jump: Array, multipliers: Multipliers) -> Array:
+        """Return -sigma nu, exerted on the foundation, layer included, shape (n, d)."""
         nodes, pressure = self.nodes, self.pressure(jump, multipliers)
         tangential = nodes.tangential_component(multipliers.friction)
         return pressure[:, None] * nodes.normal + tangential
@@ -229,7 +229,7 @@ class Interface:
     def add_forces(self, residual: Array, x: Array, multipliers: Multipliers) -> None:
         """Add the forces T^T W (lambda + p_l nu, -D.nu) at local unknowns to owned values.
 
-        lambda is the contact stress of the multipliers, p_l the pressure of the layer, and D.nu the
+        lambda is that of the multipliers, without the pressure p_l of the layer; D.nu is the
         charge, 0 of an insulator.
         """
         nodes = self.nodes

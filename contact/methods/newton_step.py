@@ -1,7 +1,7 @@
 """One step of Newton's method: material, contact, friction, layer and charge linearised together.
 
-Active constraints enter by a penalty gamma far above the stiffness of the body, and the multipliers
-are updated, lambda+ = lambda + gamma (u_nu+ - rho), (19a): as gamma grows this is the primal-dual
+The multipliers are condensed with gamma, far above the stiffness of the body, and updated,
+lambda+ = lambda + gamma (u_nu+ - rho), (19a): as gamma grows this is the primal-dual
 active set strategy. The linear systems keep the size and pattern of the elastic ones. Iterative
 solvers stop at a forcing term (inexact Newton). `safeguards` keep active sets from cycling.
 
@@ -57,8 +57,8 @@ class LinearisedLaws:
 
     active_set: ActiveSet  #: of the step
     unchanged: bool  #: whether it is the active set of the last step, on all ranks
-    multipliers: Multipliers  #: lambda^0 of (19) in docs/algorithms.md
-    contact: Array  #: the blocks B of (19)
+    constant: Multipliers  #: lambda^0, the multipliers of (19) in docs/algorithms.md at dx = 0
+    blocks: Array  #: B, their derivatives
     layer: Array  #: blocks of the layer
     layer_shift: Array  #: its linearised pressure at dx = 0 less its pressure, (n,)
     charge: Array  #: blocks of the charge, or 0
@@ -180,7 +180,7 @@ class NewtonStep:
         jump = interface.nodes.jump(state.x)
         total, length = interface.pressure(jump, state.forces), interface.slip_length(jump)
         s = interface.friction.bound(total, length)
-        active, forces = guarded_active_set(interface, jump, state.forces, s, parameters.c, before)
+        active, about = guarded_active_set(interface, jump, state.forces, s, parameters.c, before)
         changed = before is None or not active.same(before)
         unchanged = float(summed(interface.comm, changed)) == 0
         by_slip = np.zeros_like(s)
@@ -188,16 +188,16 @@ class NewtonStep:
             limit = self.options.softening * parameters.nodal_stiffness
             by_slip = bound_by_slip(interface, total, length, limit)
         bound = LinearisedBound(s, interface.friction.by_pressure(total, length), by_slip)
-        multipliers, contact = linearise(interface, jump, forces, active, parameters, bound)
+        constant, blocks = linearise(interface, jump, about, active, parameters, bound)
         layer, shift = linearised_layer(interface, jump, state, parameters, unchanged)
-        law, charge = interface.foundation, np.zeros_like(contact)
+        law, charge = interface.foundation, np.zeros_like(blocks)
         if law.active:
             # With the derivative of psi(u_nu - rho), or psi frozen.
             follow = unchanged
             if law.follows_gap:
                 follow = self._conductivity_derivative(residual, unchanged)
-            charge = law.charge_block(jump, interface.pressure(jump, multipliers), follow)
-        return LinearisedLaws(active, unchanged, multipliers, contact, layer, shift, charge)
+            charge = law.charge_block(jump, interface.pressure(jump, constant), follow)
+        return LinearisedLaws(active, unchanged, constant, blocks, layer, shift, charge)
 
     def _update(
         self, problem: AnyProblem, iterate: EvaluatedState, laws: LinearisedLaws, tangent: bool
@@ -205,7 +205,7 @@ class NewtonStep:
         """Assemble and factorise the operator. Collective."""
         interface, body = problem.interface, problem.body
         state, residuals = iterate.state, iterate.residuals
-        blocks = laws.contact + laws.layer + laws.charge
+        blocks = laws.blocks + laws.layer + laws.charge
         if self._underconstrained and not laws.unchanged:
             blocks[:, : body.dim, : body.dim] += regularisation(
                 interface, residuals.significant, self.parameters.nodal_stiffness
@@ -218,7 +218,7 @@ class NewtonStep:
 
 def _residual(problem: AnyProblem, iterate: EvaluatedState, laws: LinearisedLaws) -> Array:
     """Return G(x, lambda^0), with the linearised pressure of the layer. Collective."""
-    state, nodes = replace(iterate.state, forces=laws.multipliers), problem.interface.nodes
+    state, nodes = replace(iterate.state, forces=laws.constant), problem.interface.nodes
     at = iterate.state.secant_at
     internal = iterate.internal if at is None else problem.body.secant_forces(iterate.state)
     residual = residual_forces(problem, state, internal)
@@ -230,8 +230,8 @@ def _moved(problem: AnyProblem, state: State, laws: LinearisedLaws, increment: A
     """Return the next iterate x + dx, with lambda+ = lambda^0 + B T dx. Collective."""
     interface, body = problem.interface, problem.body
     nodes, moved = interface.nodes, interface.nodes.jump(increment)
-    change = np.einsum("nij,nj->ni", laws.contact, moved)
-    vectors = laws.multipliers.vectors(nodes) + change[:, : interface.dim]
+    change = np.einsum("nij,nj->ni", laws.blocks, moved)
+    vectors = laws.constant.vectors(nodes) + change[:, : interface.dim]
     forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
     pressed = nodes.normal_component(np.einsum("nij,nj->ni", laws.layer, moved))
     layer = interface.foundation.layer_pressure(nodes.jump(state.x)) + laws.layer_shift + pressed

@@ -40,10 +40,10 @@ class LoopOptions(Options):
     stopping: Literal["residual", "thesis"] = "residual"
     """`residual`: the KKT residuals end the loops. `thesis`: the rules on the change between
     iterations end them, (3.45) and (3.46), with a potential (5.38); without friction (6.40),
-    with `penalty` (4.38); phi is measured in the unit sqrt(mu_1/beta), where the thesis adds
-    the numbers of u and phi. The residuals decide `converged` in any case."""
+    (6.41), with `penalty` (4.38); phi is measured in the unit sqrt(mu_1/beta), where the thesis
+    adds the numbers of u and phi. The residuals decide `converged` in any case."""
     eps_fp: Annotated[Tolerance, ReadWith("stopping", "thesis")] = 1e-5
-    """Tolerance of (3.46), outer loop."""
+    """Tolerance of (3.46), (6.40), with `penalty` of (4.38): outer loop."""
     max_inner: Count = 5000
     """Most inner iterations in an outer one."""
     material_step: Literal["secant", "tangent", "auto"] = "auto"
@@ -69,7 +69,7 @@ class FixedPointOptions(LoopOptions):
     """Augmentation parameter of the Uzawa block relaxation (stress/length). `auto` fits a block;
     where the relaxation stalls with that, a slender body or the soft layer of a stiff one."""
     acceleration: Literal["anderson", "none"] = "anderson"
-    """Acceleration of the Uzawa block relaxation."""
+    """Acceleration of the Uzawa block relaxation: nonlinear GMRES, akin to Anderson's method."""
     depth: Annotated[
         int,
         Ge(1),
@@ -139,8 +139,8 @@ class NewtonOptions(Options):
     max_iterations: Internal[int] = 60
     """Number of steps allowed in each stage."""
     gamma: Internal[float] = 1e4
-    """gamma/max(c, kappa), the ratio of the penalty of the eliminated constraints to the
-    stiffness of the body, (20)."""
+    """gamma/max(c, kappa), (20): the ratio of the augmentation parameter, with which the
+    multipliers are condensed, to the stiffness of the body."""
     stagnation_limit: Internal[int] = 12
     """Steps without progress after which the stage is given up."""
     softening: Internal[Annotated[float, AllowInfNan()]] = 0.25

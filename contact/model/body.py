@@ -188,11 +188,11 @@ class Load(Described):
     pressure: Value | None = None
     """Normal pressure p on the part: traction -p along the outward normal."""
     charge: Value | None = None
-    """Charge per area of the part."""
+    """D·ν on the part, ν out of the body (charge per area): minus the free surface charge."""
     body_force: Values | None = None
     """Force per volume."""
     body_charge: Value | None = None
-    """Charge per volume."""
+    """Free charge per volume, div D."""
     amplitude: FactorOfTime | None = None
     """Factor of all of these as a function of time, see `[evolution]`."""
 

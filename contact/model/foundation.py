@@ -114,8 +114,8 @@ class Conductor:
         Truncation phi_L of the potential difference; by default there is none.
     lagged
         Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
-        thesis does: it then converges for small k_e only (Theorem 5.2). Else phi is implicit,
-        as a Robin term in Algorithm 5, and psi is lagged until the residual is small.
+        thesis does, for small k_e (Theorem 5.2 proves that it then converges). Else phi is
+        implicit, as a Robin term in Algorithm 5, and psi is lagged until the residual is small.
     phi_f_at
         phi_f as a function of time; None where it is always the same.
     share

@@ -3,10 +3,11 @@
 At a solution whose active set does not change nearby, the unknowns x and the contact forces
 lambda = lambda_c nu + lambda_f of the nodes (f in the code) satisfy smooth equations,
 
-    F(x) - f + T^T W lambda = 0,     C(T x, lambda) = 0,
+    F(x) + P(T x) - f + T^T W lambda = 0,     C(T x, lambda) = 0,
 
-equilibrium and, node by node, one vector condition: lambda = 0 (open), gap - u_nu = 0 (in contact),
-u_tau = 0 (stick), lambda_f = s u_tau/|u_tau| (slip). Layer and charge, functions of T x, are in F.
+with the forces P of layer and charge: equilibrium and, node by node, one vector condition:
+lambda = 0 (open), gap - u_nu = 0 (in contact), u_tau = 0 (stick),
+lambda_f = s u_tau/|u_tau| (slip).
 `Linearised` solves with their derivative, the Jacobian J = [[K, T^T W], [C_u T, C_f]], and with its
 transpose. lambda is condensed node by node, with gamma as in
 Newton's method; the remainder that gamma leaves in C is corrected by further back-substitutions

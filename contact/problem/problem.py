@@ -266,15 +266,21 @@ class ContactProblem:
         conducts = contact.conductor is not None and self.piezoelectric
         return find_nodes(body, contact.on, *arguments, conducts)
 
+    @cached_property
+    def contact_young(self) -> float:
+        """Largest modulus at a contact (stress); of a pair that of the softer side. Collective.
+
+        Parts away from the contacts may be much softer.
+        """
+        where = self.domain, self.description.materials, self.body.cells
+        sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
+        return max(min(young_behind(*where, side) for side in both) for both in sides)
+
     def _interface(self) -> Interface:
         """Return the laws of all contacts at their geometries. Collective."""
         body, geometries = self.body, self.geometries
         nodes = joined_nodes(geometries, [contact.on for contact in self.contacts], body)
-        # The softer side of a pair: parts away from the contact may be much softer.
-        where = self.domain, self.description.materials, body.cells
-        sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
-        young = max(min(young_behind(*where, side) for side in both) for both in sides)
-        stiffness = young / self.domain.size
+        stiffness = self.contact_young / self.domain.size
         conductors = [contact.conductor for contact in self.contacts]
         law = FoundationLaw(
             nodes=nodes,
@@ -326,6 +332,7 @@ class ContactProblem:
         mesh_area = self._area(replace(domain, revolved=False)) if domain.revolved else contact_area
         return Scales(
             young=float(law.young),
+            contact_young=self.contact_young,
             poisson=float(law.poisson),
             bulk=float(law.bulk),
             shear=float(law.shear),

@@ -130,9 +130,9 @@ class EvaluatedState:
 def residual_forces(problem: AnyProblem, state: State, internal: Array | None = None) -> Array:
     """Return G(x, lambda) = F(x) - f + T^T W lambda on the owned unknowns. Collective.
 
-    The residual r of the body with contact: lambda includes layer and charge, as in (15) of
-    docs/residuals.md. At fixed unknowns G is the reaction of the support on the body. The internal
-    forces F(x) are those of the material law by default.
+    The residual of the body with contact. In (15) of docs/residuals.md lambda includes layer and
+    charge; `state.forces` does not. At fixed unknowns G is the reaction of the support on the body.
+    The internal forces F(x) are those of the material law by default.
     """
     body = problem.body
     if internal is None:

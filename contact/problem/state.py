@@ -60,7 +60,9 @@ class Scales:
     Attributes
     ----------
     young, poisson, bulk, shear
-        Elastic constants of small strains (stress, none, stress, stress).
+        Elastic constants of small strains, of the softest material (stress, none, stress, stress).
+    contact_young
+        Young's modulus at the contacts (stress).
     size
         Largest extent (length).
     height
@@ -72,6 +74,7 @@ class Scales:
     """
 
     young: float
+    contact_young: float
     poisson: float
     bulk: float
     shear: float
@@ -83,7 +86,7 @@ class Scales:
     @property
     def plane_modulus(self) -> float:
         """E' = E/(1 - nu^2) (stress)."""
-        return self.young / (1 - self.poisson**2)
+        return self.contact_young / (1 - self.poisson**2)
 
     @property
     def c(self) -> float:
@@ -96,7 +99,7 @@ class Scales:
         return 1.39 * self.plane_modulus / math.sqrt(self.spacing * self.height)
 
     def complementarity_parameters(self, ratio: float) -> ComplementarityParameters:
-        """Return c, kappa = c^2 H/E' = 1.93 E'/h, and gamma, `ratio` times the larger one."""
+        """Return c, kappa = 1.93 E'/h at the contacts, and gamma, `ratio` times the larger one."""
         c = self.c
         kappa = c**2 * self.height / self.plane_modulus
         return ComplementarityParameters(c, kappa, ratio * max(c, kappa))

@@ -325,7 +325,7 @@ def contact_shares(
     """Return the results of each contact by its name, with the status of its nodes. Collective."""
     nodes, jump = problem.nodes, problem.nodal(state)
     pressure = problem.interface.pressure(jump, state.forces)
-    forces = nodes.weight[:, None] * problem.interface.stress(jump, state.forces)
+    forces = nodes.weight[:, None] * problem.interface.traction(jump, state.forces)
     found = {}
     for number, contact in enumerate(problem.contacts):
         own = problem.entry_numbers == number

@@ -116,7 +116,7 @@ class ContactForce:
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
         nodes = problem.nodes
-        stress = problem.interface.stress(problem.nodal(state), state.forces)
+        stress = problem.interface.traction(problem.nodal(state), state.forces)
         own = _of_contact(problem, self.contact)
         return self._share(problem) * nodes.sum(np.where(own, stress[:, self.axis], 0.0))
 

@@ -586,7 +586,7 @@ _RUN = (
         lambda r: r.potential_range and r.potential_range[1],
     ),
     Quantity(
-        "total_charge", "charge", "Sum of all charges: 0 up to the tolerance, by Gauss's law.",
+        "total_charge", "charge", "D·ν over the surface less the volume charge: 0 by Gauss's law.",
         lambda r: r.charges and r.charges.total,
     ),
     Quantity(

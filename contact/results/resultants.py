@@ -64,7 +64,7 @@ def resultant(problem: ContactProblem, points: Array, forces: Array) -> Resultan
 def contact_resultant(problem: ContactProblem, state: State) -> Resultant:
     """Return the resultant of the body's forces on the foundations. Collective."""
     nodes = problem.nodes
-    stress = problem.interface.stress(problem.nodal(state), state.forces)
+    stress = problem.interface.traction(problem.nodal(state), state.forces)
     return resultant(problem, nodes.points, nodes.weight[:, None] * stress)
 
 
@@ -182,7 +182,7 @@ def _driven(body: Body) -> str | None:
 
 @dataclass(frozen=True)
 class ChargeBalance:
-    """Free charges of a body.
+    """Charges of a body: D.nu over its parts, nu out of it, which is minus their free charge.
 
     A node of two electrodes with a prescribed potential counts for the one that is fixed first.
     `magnitude` is a scale: with an insulator and one electrode all parts are neutral, though not
@@ -211,7 +211,7 @@ class ChargeBalance:
 class Reading:
     """The reading of a sensor's electrode."""
 
-    charge: float | None  #: free charge of the part; None if its potential is not prescribed
+    charge: float | None  #: int D.nu over the part; None if its potential is not prescribed
     potential: float  #: mean over the part
 
 

@@ -19,8 +19,8 @@ References
 ----------
 Glowinski and Le Tallec, Augmented Lagrangian and Operator-Splitting Methods in Nonlinear Mechanics,
 SIAM (1989), their ALG2; also known as ADMM.
-Koko, Uzawa block relaxation domain decomposition method for a two-body frictionless contact
-problem, Appl. Math. Lett. 22 (2009) 1534.
+Koko, Uzawa block relaxation method for the unilateral contact problem, J. Comput. Appl. Math. 235
+(2011) 2343.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class RelaxationResult:
     """End of a Uzawa block relaxation."""
 
     increment: Array  #: dx on the owned unknowns
-    #: Contact stress lambda + r (u - phi) of the last Step 1, in equilibrium with its u.
+    #: Of lambda + r (u - phi) before Step 3, in equilibrium with u; admissible in the limit alone.
     forces: Multipliers
     z: Array  #: variable of the next relaxation, about the new iterate, (n, 1 + d)
     iterations: int  #: number of linear solves
@@ -291,13 +291,13 @@ def uzawa_block_relaxation(
         # Tangential again: rounding along the normal would be amplified by the acceleration.
         z[:, 1:] = nodes.tangential_component(z[:, 1:])
         # Steps 2 and 3 of the last solve, then Step 1.
-        multipliers = frozen.project(z, bound)
-        load = frozen.displacement_load(multipliers, z)
+        projected = frozen.project(z, bound)
+        load = frozen.displacement_load(projected, z)
         increment = operator.solve(load, rtol if rtol < TOLERANCE else None, increment)
         moved = nodes.jump(increment)
         jump, r_u = frozen.jump_0 + moved, frozen.augmented(moved)
         # lambda + r (u - phi) of Step 1, in equilibrium with u; not yet lambda of (3.36).
-        stress = 2 * multipliers - z + r_u
+        stress = 2 * projected - z + r_u
         if iteration == 1:
             stress_unit = interface.component_norms(stress)
         forces = frozen.multipliers(jump, stress)
@@ -305,7 +305,7 @@ def uzawa_block_relaxation(
             bound[:] = interface.bound(jump, forces)
         residual = float(interface_residuals(interface, jump, forces, bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
-        next_z = multipliers + (1 - over) * (z - multipliers) + over * r_u
+        next_z = projected + (1 - over) * (z - projected) + over * r_u
         done = residual <= options.inner or not np.isfinite(residual)
         # The residual is small before contact, the defect of the fixed point is not.
         defect = nodes.norm((stress - frozen.project(stress + r_u, bound)) / stress_unit[:, None])

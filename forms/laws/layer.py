@@ -1,4 +1,4 @@
-"""The compliant layer: p_nu, its pressure at a penetration, and h_nu, its stiffness."""
+"""The compliant layer of the pressure h_nu p_nu: p_nu of its penetration, the stiffness h_nu."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from forms.ops import Value, absolute, is_unlimited, less_equal, minimum, positi
 
 
 class PenetrationLaw(Protocol):
-    """p_nu: the pressure of a layer at its penetration s = u_nu - rho_0, (h~6) of chapter 6.
+    """p_nu of the penetration s = u_nu - rho_0 of a layer of the pressure h_nu p_nu, (h~6).
 
     It vanishes for s <= 0 and should not fall: else several solutions may coexist.
     """
@@ -38,7 +38,7 @@ class Compliance:
     Parameters
     ----------
     limit
-        n_nu > 0 (length); infinity gives the law (1.28).
+        n_nu > 0 (length); infinity gives with h_nu = c the law (1.28).
     """
 
     limit: float

@@ -152,7 +152,7 @@ ROWS = (
         "Theorem 5.2",
         "Algorithm 4 per iteration",
         "figures_piezo",
-        "with lagged charge converges for small conductivity alone",
+        "with lagged charge converges for small conductivity, and from some value on fails",
     ),
     Row(
         "Figure 8.7",

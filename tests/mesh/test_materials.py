@@ -4,7 +4,21 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Body, Fixed, InputError, Load, Material, build_problem, parse_case, solve
+from contact import (
+    Body,
+    Contact,
+    Fixed,
+    FixedPointOptions,
+    Friction,
+    InputError,
+    Load,
+    Material,
+    NewtonOptions,
+    Problem,
+    build_problem,
+    parse_case,
+    solve,
+)
 from contact.body.equilibrium import BodyEquilibrium
 from contact.history import BodyState
 from contact.mesh.domain import from_mesh
@@ -81,6 +95,35 @@ def test_layers_in_series(law: str, degree: int) -> None:
     fields = DerivedFields(problem.body, solution.state)
     strains = [largest.strain for largest in fields.extremes()]
     np.testing.assert_allclose(strains, 0.1 / np.array(moduli) * np.sqrt(2 / 3), rtol=1e-8)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("beside", [True, False])
+def test_a_soft_part_away_from_the_contact(beside: bool) -> None:
+    """Parameters are of the modulus at Gamma_3: with that of the soft part steps were 309, 2059."""
+    grid = rectangle(COMM, (0.0, 0.0), (1.0, 1.0), (16, 16), cell="quadrilateral")
+
+    def soft(x):
+        return (x[1] > 0.75 - 1e-9) & ((x[0] < 0.25 + 1e-9) | (not beside))
+
+    sides = {"bottom": lambda x: np.isclose(x[1], 0.0), "top": lambda x: np.isclose(x[1], 1.0)}
+    # Of cells with all their vertices in these places.
+    hard = {"hard": lambda x: (x[1] < 0.75 + 1e-9) | ((x[0] > 0.25 - 1e-9) & beside)}
+    domain = from_mesh(grid.mesh, sides, regions={"soft": soft, **hard})
+    contact = Contact("bottom", lambda x: 0.01 * (x[0] - 0.4) ** 2, friction=Friction(mu=0.3))
+    for ratio, relaxations in ((1e-4, 300), (1e-6, None)):
+        laws = [(UPPER, "hard"), (ratio * UPPER, "soft")]
+        materials = [Material(Linear(young, 0.3), on=name) for young, name in laws]
+        body = Body(materials, [Fixed("top", [1e-3, -4e-3])])
+        problem = Problem(domain, body, contact)
+        assert problem.scales.young == ratio * UPPER
+        assert problem.scales.contact_young == UPPER
+        solution = solve(problem, NewtonOptions())
+        assert solution.converged and solution.counters.contact_solves < 15
+        if relaxations is not None:
+            other = solve(problem, FixedPointOptions())
+            assert other.converged and other.counters.linear_solves < relaxations
+            assert other.contact_force == pytest.approx(solution.contact_force, rel=1e-6)
 
 
 def test_the_energy_norm_knows_the_materials() -> None:

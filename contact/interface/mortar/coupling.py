@@ -4,8 +4,8 @@ The multiplier is sum_j lambda_j Phi_j with functions Phi_j that are dual to the
 int Phi_j N~_k = delta_jk w_k, w_k = int N~_k over the part of the slave that faces the master. The
 rows of the jumps T = [D, -M] are divided by these areas (`JumpRows`),
 
-    j_j = sum_k D_jk u_k - sum_l M_jl u_l,   D_jk = w_j^-1 int Phi_j N_k,
-                                             M_jl = w_j^-1 int Phi_j (N_l o Pi),
+    [u]_j = sum_k D_jk u_k - sum_l M_jl u_l,   D_jk = w_j^-1 int Phi_j N_k,
+                                               M_jl = w_j^-1 int Phi_j (N_l o Pi),
 
 where Popp and others have D and M without w_j^-1. D is the identity; A^-T on quadratic triangles,
 where N~ = A N (`dual_basis_transformation`). Slave nodes without multiplier, as at crosspoints,
@@ -250,7 +250,8 @@ class Coupling(JumpRows):
     normal
         Unit vectors from the slave to the master, between their normals, shape (n, d).
     gap
-        Mean distance along them, shape (n,) (length); infinite where nothing faces the master.
+        Weighted gap int Phi_j g / w_j of the distance g along them, shape (n,) (length); infinite
+        where nothing faces the master.
     gap_positive_part
         int Phi_j max(g, 0) / int N~_j of the distance g at a point, whose mean is `gap`, shape
         (n,); below 0 by negative functions Phi_j alone.
