@@ -315,7 +315,14 @@ class BodyEquilibrium:
         self.assemble(matrix, "tangent", state, constrained=False)
         nodal = times(matrix, weights[: self.owned], transposed=True)
         matrix.destroy()
-        return np.concatenate([nodal, np.zeros(self.global_unknowns.size)])
+        on_q: Array = np.zeros(self.global_unknowns.size)
+        border = self.border("tangent")
+        if border is not None:
+            columns, corner = border
+            nodal = nodal + columns @ weights[self.owned :]
+            on_q = summed(self.comm, columns.T @ weights[: self.owned])
+            on_q = on_q + corner.T @ weights[self.owned :]
+        return np.concatenate([nodal, on_q])
 
     def forces_without_history(self, state: LinearisationPoint) -> Array:
         """Return the owned nodal forces of all materials without internal variables. Collective."""

@@ -232,6 +232,7 @@ class SparseOperator:
         self._kind = ""
         self._blocks: Array | None = None
         self._split: BlockPreconditioner | None = None
+        self._transposed: PETSc.KSP | None = None
         self._hierarchy: Hierarchy | None = None
         self.ksp = PETSc.KSP().create(self.layout.comm)
         self.ksp.setOptionsPrefix(PREFIX)
@@ -265,7 +266,7 @@ class SparseOperator:
         same = kind == self._kind and (reuse or self.bulk.linear)
         if same and last is not None and self._all(np.array_equal(blocks, last)):
             return False
-        self._kind, self._blocks = kind, blocks.copy()
+        self._kind, self._blocks, self._transposed = kind, blocks.copy(), None
         if not same:
             self.bulk.assemble(self.matrix, kind, state)
             if self._modes is not None:
@@ -336,13 +337,33 @@ class SparseOperator:
         # Iterative solvers leave fixed unknowns within their tolerance.
         return self.layout.mask(self._solution.array)
 
-    def solve_transposed(self, rhs: Array) -> Array:
+    def solve_transposed(self, rhs: Array, rtol: float | None = None) -> Array:
         """Solve with the transposed matrix; see `solve`. Collective."""
         self._rhs.array[:] = self.layout.mask(rhs)
-        self.ksp.setInitialGuessNonzero(False)
-        self.ksp.solveTranspose(self._rhs, self._solution)
-        self._solved(self.ksp.getIterationNumber(), self._rhs.norm(), self._solution.norm())
+        ksp = self.ksp if self._split is None else self._transposed_solver()
+        ksp.setTolerances(rtol=self._tolerance if rtol is None else rtol)
+        ksp.setInitialGuessNonzero(False)
+        solve = ksp.solveTranspose if self._split is None else ksp.solve
+        solve(self._rhs, self._solution)
+        self._solved(ksp.getIterationNumber(), self._rhs.norm(), self._solution.norm())
         return self.layout.mask(self._solution.array)
+
+    def _transposed_solver(self) -> PETSc.KSP:
+        """Return a solver of the transposed piezoelectric matrix. Collective.
+
+        BoomerAMG has no transpose with its smoothers: PETSc's is wrong, and says nothing.
+        """
+        if self._transposed is None:
+            self._transposed = PETSc.KSP().create(self.layout.comm)
+            self._transposed.setOptionsPrefix(PREFIX)
+            split = BlockPreconditioner(self._transposed, self.layout, self.symmetric)
+            with petsc_options(PREFIX):
+                self._transposed.setFromOptions()
+                matrix = self.matrix.transpose(PETSc.Mat())
+                system = PETSc.Mat().createTranspose(self.system)
+                self._transposed.setOperators(system, split.matrix(matrix))
+                set_up_with_workspace(self._transposed)
+        return self._transposed
 
     def _refine(self) -> int:
         """Refine the solution; return the number of iterations. Collective."""

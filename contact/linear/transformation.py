@@ -340,14 +340,20 @@ class TransformedOperator:
         on_q = self._on_q(bulk.columns, nodal) + bulk.corner @ q
         return self._transformation.forces(np.concatenate([forces, on_q]))
 
-    def solve_transposed(self, rhs: Array) -> Array:
+    def solve_transposed(self, rhs: Array, rtol: float | None = None) -> Array:
         """Solve with the transposed operator; see `SparseOperator.solve_transposed`. Collective."""
         transformation, free = self._transformation, self._free
         restricted = transformation.restrict(rhs)
         nodal, forces = restricted[: self._owned], restricted[self._owned :][free]
         columns = self._bulk.columns[:, free]
-        first = self._inner.solve_transposed(nodal)
-        solved = [self._inner.solve_transposed(columns[:, k]) for k in range(free.size)]
+        if self._inner.iterative:
+            relative = self._inner.solve_transposed(
+                nodal - columns @ (self._inverse @ forces), rtol
+            )
+            moved = self._inverse @ (forces - self._on_q(columns, relative))
+            return self._expanded(relative, moved)
+        first = self._inner.solve_transposed(nodal, rtol)
+        solved = [self._inner.solve_transposed(columns[:, k], rtol) for k in range(free.size)]
         responses = np.stack([*solved], axis=1) if solved else np.zeros_like(columns)
         return self._expanded(*self._eliminated(columns, responses).solve(first, forces))
 

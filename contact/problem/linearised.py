@@ -160,7 +160,7 @@ class Linearised:
         interface, nodes, active = self.problem.interface, self.problem.nodes, self.active
         d, slip = nodes.dim, interface.slip(jump)
         length = np.linalg.norm(slip, axis=1)
-        size = np.where(active.slips, np.maximum(length, np.finfo(float).tiny), 1.0)
+        size = np.where(active.slips, np.maximum(length, EPS * interface.size), 1.0)
         along = slip / size[:, None]
         normal = nodes.normal[:, :, None] * nodes.normal[:, None, :]
         friction, closed = interface.friction, active.closed[:, None, None]
@@ -223,7 +223,7 @@ class Linearised:
         while True:
             dc_0 = np.einsum("nji,nj->ni", self._regular, residual)
             nodes.add_jump_transposed(-np.einsum("nji,nj->ni", self._by_jump, dc_0), rhs)
-            dx = self._operator.solve_transposed(rhs)
+            dx = self._operator.solve_transposed(rhs, EPS)
             moved = weight * nodes.jump(self.problem.body.local(dx))[:, : nodes.dim]
             dc = dc_0 - np.einsum("nji,nj->ni", self._regular, moved)
             x, c = x + dx, c + dc
@@ -267,11 +267,18 @@ class Linearised:
         by_pressure = friction.smoothing.transposed(by_bound)[:, None]
         return by_pressure * self._layer, by_pressure * self.problem.nodes.normal
 
-    @staticmethod
-    def _enough(taken: list[float], size: float) -> bool:
+    def _enough(self, taken: list[float], size: float) -> bool:
         """Tell whether corrections have converged; raise InputError where they do not halve."""
         last, now = (np.inf, *taken)[-2:]
         if EPS * 2.0 ** len(taken) > 1:
+            if self.problem.interface.friction.local:
+                layout = self.problem.body.layout
+                most = multigrid.LARGE[layout.dim, layout.piezoelectric]
+                raise InputError(
+                    "derivatives: the linear solves by multigrid do not converge; accepted: fewer "
+                    f"than {most:,} unknowns, which a direct solver takes",
+                    "no-derivative",
+                )
             raise InputError(
                 "friction.radius: the coupling of the nodes by a smoothed pressure is too strong "
                 "for derivatives; accepted: a smaller radius or coefficient of friction",

@@ -304,8 +304,13 @@ def strong_friction(solution: Solution) -> Iterator[str]:
             "balance where they do not meet"
         )
     elif solution.critical_factor <= 1:
-        own = law.maximum if law is not None and nodes.nodes.size else 0.0
-        critical = solution.critical_factor * solution.problem.comm.allreduce(own, op=MPI.MAX)
+        # mu = s/p at the present slip, of which the factor is.
+        pressure = np.maximum(solution.pressure, np.finfo(float).tiny)
+        mu = nodes.maximum(np.where(solution.pressure > 0, solution.friction_bound / pressure, 0.0))
+        if mu == 0:  # nothing touches
+            own = law.maximum if law is not None and nodes.nodes.size else 0.0
+            mu = solution.problem.comm.allreduce(own, op=MPI.MAX)
+        critical = solution.critical_factor * mu
         yield f"the linearised problem is singular from a friction coefficient of {critical:.4g} on"
 
 

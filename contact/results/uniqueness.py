@@ -1,10 +1,10 @@
 """Critical friction, from which on several solutions may exist, by the Jacobian at a solution.
 
-Where nodes slide in given directions t, the increments of pressures and of slips satisfy
-S_nt du + w dp = 0 and S_tt du + w mu dp = 0, S being the stiffness of the body condensed onto them
-with nodes that are open left free. So S_tt - mu S_nt is singular at a critical mu: the pencil's
-real eigenvalues (Hassani, Hild, Ionescu and Sakki 2003). Modes in which a
-body without supports slides nearly as a rigid one are left out: they say nothing about its
+Where nodes slide in given directions t, and mu is that of their present slips, the increments of
+pressures and of slips satisfy S_nt du + w dp = 0 and S_tt du + w mu dp = 0, S being the stiffness
+of the body condensed onto them with nodes that are open left free. So S_tt - mu S_nt is singular at
+a critical mu: the pencil's real eigenvalues (Hassani, Hild, Ionescu and Sakki 2003). Modes in which
+a body without supports slides nearly as a rigid one are left out: they say nothing about its
 deformation.
 
 Where the bodies, without any contact force, can be in balance where they do not meet, that is a
@@ -45,10 +45,10 @@ RIGID = 1e-2
 def uniqueness(
     problem: ContactProblem, state: State, condensation: Condensation | None = None
 ) -> tuple[float, bool]:
-    """Return the least factor of mu from which on the Jacobian at a solution may be singular.
+    """Return the least multiple of the present mu at which the linearised problem is singular.
 
-    Beside it, whether friction alone keeps the bodies in contact: the state without contact forces
-    is a solution too. Below 1 the friction that is there is enough for several solutions. The
+    Beside it, whether a state without contact forces is in equilibrium too: friction alone keeps
+    the bodies in contact. Below 1 the friction that is there is enough for several solutions. The
     touching nodes slide in the directions of their friction stresses, or all in one direction, or
     in the opposite ones, in 3-D the principal ones of their stiffness and of the pressures that
     slips change; of a body that touches nothing those that touch in the reference configuration.
@@ -146,6 +146,8 @@ def _free_of_contact(
         return False
     way = change.reshape(count, dim)
     met = np.isfinite(normal_gap)
+    # nu . v = (P nu) . v for unconstrained v, with P nu = nu_a/|nu_a|^2.
+    normal = normal / np.maximum(np.sum(normal**2, axis=1), np.finfo(float).tiny)[:, None]
     allowed = BALANCED * np.linalg.norm(way, axis=1).max()
     room = (normal_gap - np.einsum("nd,nd->n", normal, way))[met] + allowed
     if room.min() >= 0 or free.shape[1] == 0:

@@ -16,6 +16,7 @@ from contact import (
     Problem,
     Rigid,
     parse_case,
+    sensitivity,
     solve,
 )
 from contact.case.build import build_problem
@@ -75,6 +76,21 @@ def test_a_bar_between_walls(given, dim, degree, linear):
     assert np.allclose(stress, force / area, rtol=1e-7, atol=0)
     energy = solution.energies
     assert energy is None or energy.energy == pytest.approx(force * s / 2, rel=1e-8)
+
+
+@pytest.mark.parametrize("given", ["force", "shortening"])
+def test_reactions_beside_a_cut_by_the_modulus(given):
+    """The cells at the cut reach the support: N is given, or E A s/L."""
+    area, s = 0.4, 0.003
+    force = YOUNG * area * s / LENGTH
+    cut = {"cut": f"abs(y - {0.8 * LENGTH}) < 1e-6"}
+    grid = {"generator": "rectangle", "size": [0.4, LENGTH], "cells": [2, 5], "inside": cut}
+    solution = solve(bar({given: {"force": force, "shortening": s}[given]}, mesh=grid), comm=COMM)
+    names = [f"reaction_y_{part}" for part in ("bottom", "top")]
+    found = sensitivity(solution, names, ["material.young"])
+    exact = 0.0 if given == "force" else area * s / LENGTH
+    for name, sign in zip(names, (-1, 1), strict=True):
+        assert found[name]["material.young"] == pytest.approx(sign * exact, abs=1e-9)
 
 
 #: Widths of the bolt and of the flanges, heights of these, Young's moduli of all.
