@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
@@ -64,11 +64,23 @@ def young_behind(
 ) -> float:
     """Return the largest Young's modulus in the cells at a part. Collective."""
     behind, _ = cells_at(domain.mesh, domain.facets(on))
-    pairs = zip(materials, cells, strict=True)
-    moduli = [
-        float(material.law.young) for material, indices in pairs if np.isin(behind, indices).any()
-    ]
-    return domain.comm.allreduce(max(moduli, default=0.0), op=MPI.MAX)
+    at_part = [np.intersect1d(behind, indices) for indices in cells]
+    largest = [young.max(initial=0.0) for young in _young(domain, materials, at_part)]
+    return domain.comm.allreduce(float(max(largest, default=0.0)), op=MPI.MAX)
+
+
+def least_young(domain: Domain, materials: Sequence[Material], cells: Sequence[Indices]) -> float:
+    """Return the least Young's modulus of a mesh. Collective."""
+    least = [young.min(initial=np.inf) for young in _young(domain, materials, cells)]
+    return domain.comm.allreduce(float(min(least, default=np.inf)), op=MPI.MIN)
+
+
+def _young(
+    domain: Domain, materials: Sequence[Material], cells: Sequence[Indices]
+) -> Iterator[Array]:
+    """Yield Young's moduli of each material in cells, with its factor. Collective."""
+    for material, indices in zip(materials, cells, strict=True):
+        yield float(material.law.young) * factor_of(domain, material, indices)
 
 
 def _check_all(domain: Domain, owner: Indices) -> None:

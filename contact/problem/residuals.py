@@ -238,7 +238,7 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
         if not loaded.any():
             # Reference of free motions: the residual of the zero initial guess.
             first = body.norms(residual_forces(problem, problem.start()))
-            scale = scale + first.max(axis=1, keepdims=True)
+            scale = scale + first
             body.internal_forces(state)  # laws with history keep their last response
     # Least reference of a component without loads, and of charges (in the unit of forces).
     scale = np.maximum(scale, EPS * scale.max())

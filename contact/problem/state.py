@@ -62,7 +62,7 @@ class Scales:
     young, poisson, bulk, shear
         Elastic constants of small strains, of the softest material (stress, none, stress, stress).
     contact_young
-        Young's modulus at the contacts (stress).
+        E_3, Young's modulus at the contacts (stress).
     size
         Largest extent (length).
     height
@@ -85,12 +85,12 @@ class Scales:
 
     @property
     def plane_modulus(self) -> float:
-        """E' = E/(1 - nu^2) (stress)."""
-        return self.contact_young / (1 - self.poisson**2)
+        """E' = E/(1 - nu^2) of the softest material (stress)."""
+        return self.young / (1 - self.poisson**2)
 
     @property
     def c(self) -> float:
-        """Complementarity parameter c = 1.39 E'/sqrt(h H), (20); the default of r (stress/length).
+        """Complementarity parameter c = 1.39 E'/sqrt(h H), (20) (stress/length).
 
         It is the geometric mean of the least and the largest stiffness of a mode of Gamma_3, about
         1.1 E'/H and 1.76 E'/h. On rectangles with the far side fixed, 16 and 32 cells of P1 over H,
@@ -98,8 +98,18 @@ class Scales:
         """
         return 1.39 * self.plane_modulus / math.sqrt(self.spacing * self.height)
 
+    @property
+    def r(self) -> float:
+        """Augmentation parameter r = c sqrt(E_3/E), by default (stress/length).
+
+        Of a body of several materials the least stiffness may be that of the softest one, with E,
+        and the largest is that of the material at the contact, with E_3.
+        """
+        return self.c * math.sqrt(self.contact_young / self.young)
+
     def complementarity_parameters(self, ratio: float) -> ComplementarityParameters:
-        """Return c, kappa = 1.93 E'/h at the contacts, and gamma, `ratio` times the larger one."""
+        """Return c, kappa = c^2 H/E' = 1.93 E'/h, and gamma = `ratio` max(c, kappa) E_3/E, (20)."""
         c = self.c
         kappa = c**2 * self.height / self.plane_modulus
-        return ComplementarityParameters(c, kappa, ratio * max(c, kappa))
+        gamma = ratio * max(c, kappa) * (self.contact_young / self.young)
+        return ComplementarityParameters(c, kappa, gamma)

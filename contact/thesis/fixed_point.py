@@ -218,7 +218,7 @@ class FixedPoint(OuterLoop):
         """Choose r and set up the operator."""
         super().__post_init__()
         r = self.options.r
-        self.r = self.problem.scales.c if r == "auto" else r
+        self.r = self.problem.scales.r if r == "auto" else r
         # Whether r is fitted, once for all load steps: from nearby they would stall with another.
         self._fitted: bool | None = None
         self.operator = self._new_operator(symmetric=True)

@@ -2,7 +2,7 @@
 
 A mode of Gamma_3 with the stiffness sigma contracts by sigma/(sigma + r) in contact and by
 r/(sigma + r) without: r = sqrt(sigma_min sigma_max) is the best. A block has about the ends
-1.1 E'/H and 1.76 E'/h, whose r is c of (20). A body that bends has a smaller sigma_min; so has one
+1.1 E'/H and 1.76 E'/h, whose r is `Scales.r`. A body that bends has a smaller sigma_min; so has one
 that a soft layer alone holds, as a rigid motion has the stiffness of the layer.
 
 References
@@ -49,7 +49,7 @@ def fitted_augmentation(problem: ContactProblem, operator: Operator, state: Stat
         return None
     if not sigma < block:
         return None
-    return scales.c * math.sqrt(sigma / block)
+    return scales.r * math.sqrt(sigma / block)
 
 
 def block_stiffness(scales: Scales) -> float:
@@ -59,7 +59,7 @@ def block_stiffness(scales: Scales) -> float:
 
 def conditioning(scales: Scales, r: float) -> str:
     """Say why the relaxation is slow with a fitted r: the ratio of stiffnesses, and its rate."""
-    stiffest = scales.c**2 / block_stiffness(scales)
+    stiffest = scales.r**2 / block_stiffness(scales)
     ratio = (stiffest / r) ** 2
     # The softest mode contracts by 1/(1 + sqrt(sigma_min/sigma_max)).
     steps = math.log(10) * math.sqrt(ratio)

@@ -100,7 +100,7 @@ def test_layers_in_series(law: str, degree: int) -> None:
 @pytest.mark.parallel
 @pytest.mark.parametrize("beside", [True, False])
 def test_a_soft_part_away_from_the_contact(beside: bool) -> None:
-    """Parameters are of the modulus at Gamma_3: with that of the soft part steps were 309, 2059."""
+    """Gamma and r have the modulus at Gamma_3: with that of the soft part steps were 309, 2059."""
     grid = rectangle(COMM, (0.0, 0.0), (1.0, 1.0), (16, 16), cell="quadrilateral")
 
     def soft(x):
@@ -111,7 +111,7 @@ def test_a_soft_part_away_from_the_contact(beside: bool) -> None:
     hard = {"hard": lambda x: (x[1] < 0.75 + 1e-9) | ((x[0] > 0.25 - 1e-9) & beside)}
     domain = from_mesh(grid.mesh, sides, regions={"soft": soft, **hard})
     contact = Contact("bottom", lambda x: 0.01 * (x[0] - 0.4) ** 2, friction=Friction(mu=0.3))
-    for ratio, relaxations in ((1e-4, 300), (1e-6, None)):
+    for ratio, relaxations in ((1e-4, 600), (1e-6, None)):
         laws = [(UPPER, "hard"), (ratio * UPPER, "soft")]
         materials = [Material(Linear(young, 0.3), on=name) for young, name in laws]
         body = Body(materials, [Fixed("top", [1e-3, -4e-3])])
@@ -124,6 +124,25 @@ def test_a_soft_part_away_from_the_contact(beside: bool) -> None:
             other = solve(problem, FixedPointOptions())
             assert other.converged and other.counters.linear_solves < relaxations
             assert other.contact_force == pytest.approx(solution.contact_force, rel=1e-6)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("factor", [1e-4, 100.0, 1e6])
+def test_a_factor_is_part_of_the_modulus(factor: float) -> None:
+    """Pressures were off by 9e-3 with a factor of 1e6 of a small modulus, and converged."""
+    found = []
+    for law, given in ((Linear(UPPER, 0.3), None), (Linear(UPPER / factor, 0.3), factor)):
+        domain = rectangle(COMM, (0.0, 0.0), (1.0, 1.0), (8, 8))
+        body = Body(Material(law, factor=given), [Fixed("top", [1e-3, -4e-3])])
+        contact = Contact("bottom", lambda x: 0.01 * (x[0] - 0.4) ** 2, friction=Friction(mu=0.3))
+        solution = solve(Problem(domain, body, contact))
+        assert solution.converged
+        assert solution.problem.scales.young == pytest.approx(UPPER)
+        found.append(solution)
+    one, other = found
+    scale = one.problem.nodes.maximum(one.pressure)
+    np.testing.assert_allclose(other.pressure, one.pressure, rtol=0, atol=1e-9 * scale)
+    assert one.counters.contact_solves == other.counters.contact_solves
 
 
 def test_the_energy_norm_knows_the_materials() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, evolve, solve
+from contact import Problem, build_problem, evolve, solve
 from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.mesh.grid import rectangle
@@ -23,6 +23,7 @@ from contact.methods.report import Outcome
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
+from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import NotConvergedError, solve_steps
@@ -30,9 +31,10 @@ from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import squares
 from tests.problems.mechanics import constant, flat
+from tests.problems.overlapping import POISSON, UNIAXIAL, YOUNG, body, layers
 from tests.problems.shaken import steps_of, tabulated
 
-SELF = MPI.COMM_SELF
+COMM, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
 
 APPROACH = {
     "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.3},
@@ -267,3 +269,23 @@ def test_a_penalised_body_that_is_unloaded_to_nothing_rests():
     assert [state.time for state in steps] == [1.0, 2.0]
     assert np.abs(steps[0].x).max() > 1e-3
     assert np.abs(steps[-1].x).max() == 0
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("ratio", [1e-3, 1e-8])
+@pytest.mark.parametrize("on", ["outer0", "inner1"])
+def test_soft_bodies_have_a_scale_of_their_own(on, ratio):
+    """Their forces were rounding beside those of a stiff body that moves: nothing touched."""
+    gap, push = 1e-3, 5e-3
+    domain = layers(COMM, "quadrilateral", 1, "flat", -gap)
+    material = Material(
+        Linear(YOUNG, POISSON), factor=lambda x: np.where(x[0] < 1.5 + gap / 2, ratio, 1.0)
+    )
+    held = [*body("flat", 2, 2).fixed[:-1], Fixed("outer1", [-push, None])]
+    against = {"outer0": "inner1", "inner1": "outer0"}[on]
+    problem = Problem(domain, Body(material, held), Contact(on, against=against))
+    for options in (NewtonOptions(tolerance=min(ratio, 1e-6)), FixedPointOptions()):
+        solution = solve(problem, options)
+        assert solution.converged
+        exact = UNIAXIAL * (push - gap) / 0.5 / (1 + 1 / ratio)
+        np.testing.assert_allclose(solution.pressure, exact, rtol=1e-5)
