@@ -376,3 +376,31 @@ def test_ten_thousand_facets_in_seconds() -> None:
     begin = time.process_time()
     couple(slave, master, 1.0)
     assert time.process_time() - begin < 5.0
+
+
+def arc(count, sign, first):
+    """Return straight facets along an arc of 0.25 rad to both sides, bulging up or down."""
+    angle = np.linspace(-0.25, 0.25, count + 1)
+    x = np.column_stack([np.sin(angle), sign * (1 - np.cos(angle))])
+    ends = np.column_stack([np.arange(count), np.arange(1, count + 1)])
+    middle = (angle[1:] + angle[:-1]) / 2
+    normal = np.column_stack([np.sin(middle), -sign * np.cos(middle)])
+    none = np.zeros((count, 0))
+    return Surface(ends + first, x[ends], normal, none, none, none, 1), x
+
+
+@pytest.mark.parametrize("more", [0, 3])
+@pytest.mark.parametrize("count", [20, 80, 320])
+def test_round_sides_face_each_other_on_any_mesh(count, more):
+    """Beyond R (h/R)^(1/3) the facets opposite were no candidates: nothing was covered there."""
+    (slave, x), (master, _) = arc(count, 1, 0), arc(count + more, -1, 1000)
+    found = couple(slave, master, 1.0)
+    within = np.abs(x[:, 0]) < 0.22
+    covered = np.zeros(len(x))
+    covered[found.nodes] = found.covered
+    assert covered[within] == pytest.approx(1.0)
+    angle = np.arcsin(x[found.nodes, 0])
+    inner = np.abs(angle) < 0.21
+    # Along the bisector of both normals gaps are the vertical distance.
+    gap = 2 * (1 - np.cos(angle[inner]))
+    assert found.gap[inner] == pytest.approx(gap, abs=0.1 / count**2 + 0.05 * 0.21**4)

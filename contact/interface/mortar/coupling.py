@@ -153,13 +153,16 @@ def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> P
 
 def _facing(slave: Surface, opposite: Opposite) -> tuple[Array, list[Points]]:
     """Return the directions along which facets look, (f, d), and the points where they meet."""
-    master, pairs, direction = opposite.master, list(opposite.pairs(slave)), slave.normal
-    quadrature = [common_points(slave, master, pair, direction) for pair in pairs]
-    middle = _middle(slave, master, quadrature)
-    if np.abs(middle - direction).max(initial=0.0) > ROUNDING:
-        direction = middle
-        quadrature = [common_points(slave, master, pair, direction) for pair in pairs]
-    return direction, quadrature
+
+    def points(direction: Array) -> list[Points]:
+        pairs = opposite.pairs(slave, direction)
+        return [common_points(slave, opposite.master, pair, direction) for pair in pairs]
+
+    quadrature = points(slave.normal)
+    middle = _middle(slave, opposite.master, quadrature)
+    if np.abs(middle - slave.normal).max(initial=0.0) <= ROUNDING:
+        return slave.normal, quadrature
+    return middle, points(middle)  # along them other facets are opposite
 
 
 def _functions(points: Points, slave: Surface, change: Array) -> Array:

@@ -50,8 +50,13 @@ class Opposite:
         facets, ranks = within(master.centres, *asked)
         return Opposite(master.sent(facets, ranks), near, radius, reach)
 
-    def pairs(self, slave: Surface) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Yield candidate pairs of facets, whose projections along the slave's normal may meet."""
+    def pairs(
+        self, slave: Surface, direction: Array
+    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Yield candidate pairs of facets, whose projections along the directions may meet.
+
+        The directions are those of the slave's facets, unit vectors, shape (f, d).
+        """
         master, near, radius = self.master, self.near, self.radius
         if near.size == 0 or master.count == 0:
             return
@@ -61,7 +66,7 @@ class Opposite:
         for row, j in in_balls(master.centres, centres[near], radius, most):
             i = near[row]
             offset = master.centres[j] - centres[i]
-            height = np.einsum("pd,pd->p", offset, slave.normal[i])
+            height = np.einsum("pd,pd->p", offset, direction[i])
             aside = np.sqrt(np.maximum(np.einsum("pd,pd->p", offset, offset) - height**2, 0.0))
             opposite = -np.einsum("pd,pd->p", slave.normal[i], master.normal[j])
             keep = (aside <= slave_radii[i] + master_radii[j]) & (opposite > FACING)
