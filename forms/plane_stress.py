@@ -45,10 +45,23 @@ class PlaneStressElastic(Anisotropic):
         b in eps_zz = b . (eps_xx, eps_yy, 2 eps_xy) + f . grad(phi), shape (3,).
     coupling
         f, shape (2,) (length/potential); zeros without a field.
+    base
+        The material, whose elastic constants are the law's; None for those of the stiffness.
     """
 
     across: ArrayLike = (0.0, 0.0, 0.0)
     coupling: ArrayLike = (0.0, 0.0)
+    base: Linear | Anisotropic | None = None
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus of the material."""
+        return super().bulk if self.base is None else float(self.base.bulk)
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus of the material."""
+        return super().shear if self.base is None else float(self.base.shear)
 
     def strain_across(self, eps: Expr, gradient: Expr | None = None) -> Expr:
         """Return eps_zz of a strain in the plane and the gradient of a potential."""
@@ -226,6 +239,13 @@ class HenckyAtPoints(_Around):
         return Response(stress, {}, stiffness, None, energy)
 
 
+def hencky_of(law: Law) -> Hencky | None:
+    """Return Hencky's nonlinear law of a material, in plane stress that of its points, or None."""
+    while isinstance(law, PlaneStressHistory | HenckyAtPoints):
+        law = law.base
+    return None if isinstance(law, Anisotropic | HistoryLaw) else law
+
+
 def in_plane_stress(law: Law, piezo: Piezo | None = None) -> tuple[Law, Piezo | None]:
     """Return the material of a plane body without stress across it.
 
@@ -260,10 +280,10 @@ def in_plane_stress(law: Law, piezo: Piezo | None = None) -> tuple[Law, Piezo | 
     least = without_stress_across(c)
     across = -c[2, [0, 1, 5]] / c[2, 2]
     if piezo is None:
-        return PlaneStressElastic(least, True, across), None
+        return PlaneStressElastic(least, True, across, base=law), None
     e, beta = np.array(piezo.e, dtype=float), np.array(piezo.beta, dtype=float)
     out = e[:, 2, 2]
     reduced = e - np.einsum("k,ij->kij", out, stiffness_tensor(c)[:, :, 2, 2]) / c[2, 2]
     coupling = -out[:2] / c[2, 2]
     tensors = Piezo(reduced, beta + np.outer(out, out) / c[2, 2])
-    return PlaneStressElastic(least, True, across, coupling), tensors
+    return PlaneStressElastic(least, True, across, coupling, law), tensors

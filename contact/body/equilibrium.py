@@ -33,7 +33,7 @@ from contact.body.description import Body
 from contact.body.elements import STANDARD, Pointwise, check_element
 from contact.body.global_unknowns import Cuts, GlobalUnknowns, make_global_unknowns
 from contact.body.loads import Loads, assembled
-from contact.body.materials import cells_of, factor_of
+from contact.body.materials import cells_of, softest
 from contact.body.supports import Rollers, free_components, supports_of, without_field
 from contact.history import BodyState, LinearisationPoint
 from contact.linear.layout import Layout, congruent, masked, projectors, times
@@ -42,7 +42,7 @@ from contact.linear.petsc import Subsystems
 from contact.linear.transformation import Transformation, TransformedBulk, TransformedOperator
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
-from contact.mesh.entities import component_sums, connected_components, graph_components
+from contact.mesh.entities import component_sums, connected_components, graph_components, sums_at
 from contact.ranks import summed
 from contact.tolerances import MOST_ROUNDING
 from contact.typing import Array
@@ -177,15 +177,18 @@ class BodyEquilibrium:
         self.space = fem.functionspace(domain.mesh, ("Lagrange", degree, (self.block_size,)))
         #: The owned cells of each material.
         self.cells = cells_of(domain, body.materials)
-        for material, cells in zip(body.materials, self.cells, strict=True):
-            factor_of(domain, material, cells)
+        self.softest = softest(domain, body.materials, self.cells)
         self.pointwise = Pointwise(self.space)
         self.supports = supports_of(domain, self.space, body)
         coupled = [material.piezo is not None for material in body.materials]
+        index_map = self.space.dofmap.index_map
+        #: Mask of the owned nodes of piezoelectric cells.
+        self.electric_nodes = np.full(index_map.size_local, all(coupled))
         if any(coupled) and not all(coupled):
             charged = np.concatenate([self.cells[i] for i in np.flatnonzero(coupled)])
+            inside = sums_at(index_map, self.space.dofmap.list[charged], 1.0)
+            self.electric_nodes = inside[: index_map.size_local] > 0
             self.supports.append(without_field(self.space, charged))
-        index_map = self.space.dofmap.index_map
         #: Mask of the owned nodal unknowns without support, shape (nodes, block size).
         self.unsupported = free_components(self.space, self.supports)
         self.rollers = Rollers(domain, self.space, body, self.unsupported)
@@ -200,7 +203,7 @@ class BodyEquilibrium:
             points=self.space.tabulate_dof_coordinates()[: index_map.size_local, : self.dim],
             free=self.unsupported & ~self.global_unknowns.tied,
             size=domain.size,
-            stiffness=float(body.law.young),
+            stiffness=self.softest.young,
             revolved=domain.revolved,
             inclined=self.rollers.inclined,
         )
@@ -483,6 +486,7 @@ class BodyEquilibrium:
             return np.zeros((1, self.component_norms.count))
         alone = state.x.copy()
         self.nodal(alone)[:, : self.dim] = 0.0
+        self.motion(alone)[self.global_unknowns.mechanical] = 0.0
         of_all, of_potential = (
             self.internal_forces(at) for at in (state, BodyState(alone, state.history))
         )

@@ -77,13 +77,13 @@ class Member:
 
     def prescribed(self, time: float) -> Array:
         """Return the given values at a time, 0 for free unknowns."""
-        description = self.description
-        return numbers_at(description.values, description.amplitude, time) / self.units
+        one = self.description
+        return numbers_at(one.values, one.amplitude, time, one.forces) / self.units
 
     def forces(self, time: float) -> Array:
         """Return the forces and moments, or the charge, on its free unknowns at a time."""
-        description = self.description
-        forces = numbers_at(description.forces, description.amplitude, time)
+        one = self.description
+        forces = numbers_at(one.forces, one.amplitude, time, one.values)
         return np.where(self.free, forces * self.units, 0.0)
 
     def motion(self, points: Array, block_size: int) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import ufl
@@ -69,10 +70,23 @@ def young_behind(
     return domain.comm.allreduce(float(max(largest, default=0.0)), op=MPI.MAX)
 
 
-def least_young(domain: Domain, materials: Sequence[Material], cells: Sequence[Indices]) -> float:
-    """Return the least Young's modulus of a mesh. Collective."""
+class Softest(NamedTuple):
+    """Elastic constants of small strains where Young's modulus is the least."""
+
+    young: float  #: (stress)
+    poisson: float
+    bulk: float  #: (stress)
+    shear: float  #: (stress)
+
+
+def softest(domain: Domain, materials: Sequence[Material], cells: Sequence[Indices]) -> Softest:
+    """Return the constants of the softest material in cells, with its factor. Collective."""
     least = [young.min(initial=np.inf) for young in _young(domain, materials, cells)]
-    return domain.comm.allreduce(float(min(least, default=np.inf)), op=MPI.MIN)
+    youngs = domain.comm.allreduce(np.array(least), op=MPI.MIN)
+    index = int(np.argmin(youngs))
+    law, young = materials[index].law, float(youngs[index])
+    factor = young / float(law.young)
+    return Softest(young, float(law.poisson), factor * float(law.bulk), factor * float(law.shear))
 
 
 def _young(

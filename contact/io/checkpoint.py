@@ -200,6 +200,7 @@ def _gathered(problem: ContactProblem, state: State) -> Arrays:
         if shares is not None:
             found[name] = np.concatenate(shares)
     once = {"motion": problem.body.motion(state.x), "t": np.array(state.time)}
+    once["phi_scale"] = np.array(problem.body.phi_scale)
     return found | once if comm.rank == 0 else {}
 
 
@@ -237,12 +238,18 @@ class _Reader:
         """Return the state in a file, and the record beside it."""
         problem, stored = self._problem, Arrays()
 
+        body = problem.body
+
         def begin() -> tuple[Array, float, str]:
             stored.update(_read(path))
             with _as_written(path):
                 self._check(path, stored)
                 for place in self._asked:
                     self._find(path, place, stored[place])
+                if body.piezoelectric:  # potentials are in units of the problem that wrote them
+                    scale = float(stored.get("phi_scale", body.phi_scale)) / body.phi_scale
+                    stored["x"][:, -1] *= scale
+                    stored["motion"][~body.global_unknowns.mechanical] *= scale
                 return stored["motion"], float(stored["t"]), str(stored.get(RECORD, ""))
 
         motion, time, record = on_root(problem.comm, begin)

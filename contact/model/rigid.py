@@ -243,10 +243,16 @@ class Rigid(Motion):
 
 
 def numbers_at(
-    values: Sequence[float | OfTime | Expression | None], given: Factor | str | None, time: float
+    values: Sequence[float | OfTime | Expression | None],
+    given: Factor | str | None,
+    time: float,
+    beside: Sequence[float | OfTime | Expression | None] = (),
 ) -> Array:
-    """Return values at a time, 0 for None: times an amplitude, as `amplitude_of` has it."""
-    known = any("t" in getattr(value, "names", ()) for value in values)
+    """Return values at a time, 0 for None: times an amplitude, as `amplitude_of` has it.
+
+    They are functions of time if one of them, or of those `beside` them in an entry, has a t.
+    """
+    known = any("t" in getattr(value, "names", ()) for value in (*values, *beside))
     numbers = [
         value.number(time) if isinstance(value, Expression | OfTime) else value or 0.0
         for value in values

@@ -16,7 +16,7 @@ from contact.body.elements import STANDARD
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.global_unknowns import GlobalUnknowns
 from contact.body.internal_variables import VARIABLES
-from contact.body.materials import least_young, young_behind
+from contact.body.materials import young_behind
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, History, InternalVariables, Part
 from contact.interface.foundation import FoundationLaw
@@ -326,16 +326,13 @@ class ContactProblem:
         return sum(area(domain, contact.on) for contact in self.contacts)
 
     def _scales(self) -> Scales:
-        domain, law, d = self.domain, self.description.law, self.dim
+        domain, d = self.domain, self.dim
         contact_area = self._area(domain)
         # Of the mesh itself, which may be but the half plane of the body.
         mesh_area = self._area(replace(domain, revolved=False)) if domain.revolved else contact_area
         return Scales(
-            young=least_young(domain, self.description.materials, self.body.cells),
+            **self.body.softest._asdict(),
             contact_young=self.contact_young,
-            poisson=float(law.poisson),
-            bulk=float(law.bulk),
-            shear=float(law.shear),
             size=domain.size,
             height=volume(domain) / contact_area,
             area=contact_area,

@@ -220,7 +220,8 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     interface.add_forces(on_contact, state.x, state.forces)
     residual = internal - body.external(state.time) + on_contact
     exerted = body.norms(on_contact) + body.piezo_norms(state)
-    scale = loads + exerted + body.norms(body.reactions(residual))
+    reactions = body.norms(body.reactions(residual))
+    scale = loads + exerted + reactions
     unbalanced = body.norms(body.unbalanced(residual))
     limit, loaded = body.rounding_limit * scale, loads > 0
     small = ~loaded | (unbalanced <= limit)
@@ -236,9 +237,10 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
         vanishes = ~loaded & (unbalanced <= rounding)
         unbalanced, rounding = (np.where(vanishes, 0.0, norms) for norms in (unbalanced, rounding))
         if not loaded.any():
-            # Reference of free motions: the residual of the zero initial guess.
+            # Reference of free motions: the residual of the zero initial guess, where supports
+            # react that of the component, beside which those of a stiffer one may be large.
             first = body.norms(residual_forces(problem, problem.start()))
-            scale = scale + first
+            scale = scale + np.where(reactions > 0, first, first.max(axis=1, keepdims=True))
             body.internal_forces(state)  # laws with history keep their last response
     # Least reference of a component without loads, and of charges (in the unit of forces).
     scale = np.maximum(scale, EPS * scale.max())

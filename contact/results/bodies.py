@@ -12,6 +12,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 from scipy import linalg
 
+from contact.body.materials import softest
 from contact.errors import counted
 from contact.mesh.entities import cells_at, owned_among
 from contact.mesh.owners import Owners
@@ -111,13 +112,8 @@ def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
     sizes = domain.mesh.h(d - 1, facets) if facets.size else np.zeros(0)
     total = problem.comm.allreduce(np.array([sizes.sum(), sizes.size]), op=MPI.SUM)
     cells, _ = cells_at(domain.mesh, facets)
-    youngs = [
-        float(material.law.young)
-        for material, own in zip(body.description.materials, body.cells, strict=True)
-        if np.isin(cells, own).any()
-    ]
-    least = problem.comm.allreduce(min(youngs, default=np.inf), op=MPI.MIN)
-    return float(total[0] / total[1]), float(least)
+    at_part = [np.intersect1d(cells, own) for own in body.cells]
+    return float(total[0] / total[1]), softest(domain, body.description.materials, at_part).young
 
 
 def apart(problem: ContactProblem) -> Iterator[Remark]:

@@ -32,13 +32,12 @@ from contact.problem.state import State
 from contact.results.quantities import of_law, quantities, values_of
 from contact.results.quantity import BODY
 from contact.typing import Array
-from forms.elasticity import Anisotropic
 from forms.hencky import is_linear, stress
-from forms.history import HistoryLaw, components, to_tensor
+from forms.history import components, to_tensor
 from forms.kinematics import deviator_squared, principal_values, strain, von_mises
 from forms.ops import maximum, sqrt
 from forms.piezo import coupling_stress, electric_displacement
-from forms.plane_stress import ACROSS, PlaneStressElastic, PlaneStressHistory
+from forms.plane_stress import ACROSS, PlaneStressElastic, PlaneStressHistory, hencky_of
 
 #: Decrease of |dev eps|, over its earlier value, that counts as unloading; and of the secant
 #: modulus, over that of small strains, that counts as yielding.
@@ -396,8 +395,8 @@ def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
     states are those at the ends of all steps. Collective.
     """
     body = problem.body
-    laws = [material.law for material in body.description.materials]
-    if not states or all(is_linear(law) or isinstance(law, HistoryLaw) for law in laws):
+    laws = [hencky_of(material.law) for material in body.description.materials]
+    if not states or all(law is None or is_linear(law) for law in laws):
         return 0.0
     fields = DerivedFields(body, BodyState(body.zero_displacement()))
     of_cells = volumes(body.domain)
@@ -408,7 +407,7 @@ def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
         fields.move_to(state)
         before, after = after, fields.strains()
         for law, own, old, new in zip(laws, sizes, before, after, strict=True):
-            if not isinstance(law, Anisotropic | HistoryLaw):
+            if law is not None:
                 modulus = np.asarray(law.secant_modulus(old**2), dtype=float)
                 yielded = modulus < (1 - SOFTENED) * float(law.shear)
                 sums[k] += own @ (yielded & (new < (1 - DECREASE) * old)).mean(axis=1)

@@ -168,7 +168,7 @@ FIELDS = (
     Quantity("strain", "", "ε, nine components as of the stress.", files=(BODY,)),
     Quantity("dev_strain", "", "|dev ε|, the norm of the strain deviator.", files=(BODY,)),
     Quantity(
-        "plastic_strain", "", "Of `j2`, nine components; `back_stress_1`, ... likewise.",
+        "plastic_strain", "", "Of `j2`, nine components; `back_stress_1`, ... (stress) likewise.",
         of_law, (BODY,),
     ),
     Quantity(
@@ -382,8 +382,9 @@ _RUN = (
     Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
     Quantity(
         "reactions", "force", "Force of the support of each part on the body, a vector per part. "
-        "A node of two parts counts for the first of them in the case. Their sum plus the loads "
-        "minus `contact_force` is zero, if forces between bodies are left out of the latter.",
+        "A node of two parts counts for the first of them in the case. Their sum plus the loads, "
+        "and the forces of `rigid_parts`, minus `contact_force` is zero, if forces between bodies "
+        "are left out of the latter.",
         lambda r: {part: held.force for part, held in r.supports.items()}, component=VECTOR,
     ),
     Quantity(

@@ -32,11 +32,9 @@ from contact.results.fields import DerivedFields, deformation, unloaded
 from contact.results.solution import Note, Remark, Solution
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
-from forms.elasticity import Anisotropic
-from forms.history import HistoryLaw
 from forms.j2 import J2
 from forms.monotonicity import check_monotonicity
-from forms.plane_stress import PlaneStressHistory
+from forms.plane_stress import PlaneStressHistory, hencky_of
 
 logger = logging.getLogger("contact.solve")
 
@@ -154,15 +152,18 @@ def unloading(solution: Solution) -> Iterator[Remark]:
 
 def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remark]:
     """Tell of strong monotonicity, (h1), on the strains in Hencky's materials, and of g(0)."""
-    dim = 3 if solution.problem.domain.revolved else solution.problem.dim
+    domain = solution.problem.domain
+    whole = 3 if domain.revolved else domain.dim
     for material, strain in zip(solution.problem.description.materials, strains, strict=True):
-        law = material.law
-        if not np.isfinite(strain) or isinstance(law, Anisotropic | HistoryLaw):
+        law = hencky_of(material.law)
+        if law is None or not np.isfinite(strain):
             continue
+        dim = 3 if material.in_plane_stress else whole
         found = check_monotonicity(law, strain, dim=dim)
         constants = (
             f"up to |dev eps| = {strain:.4g} g_0 = {found.g_0:.4g} <= g <= {found.largest:.4g}, "
             f"(d/2) k_0 = {found.ceiling:.4g}, alpha = {found.alpha:.4g}, beta = {found.beta:.4g}"
+            + (", times the material's factor" if material.factor is not None else "")
         )
         if found.hardens and found.g_0 > 0:  # where g is above (d/2) k_0 alone it is monotone too
             yield Note(f"strong monotonicity is {'met' if found.holds else 'not met'}: {constants}")

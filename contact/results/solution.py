@@ -367,7 +367,7 @@ class Solution(Solved):
             return None
         comm, body = self.problem.comm, self.problem.body
         scaled = self.state.x[: body.owned].reshape(-1, body.block_size)[:, -1]
-        phi = body.phi_scale * scaled
+        phi = body.phi_scale * scaled[body.electric_nodes]
         return (
             comm.allreduce(float(phi.min(initial=math.inf)), op=MPI.MIN),
             comm.allreduce(float(phi.max(initial=-math.inf)), op=MPI.MAX),

@@ -15,6 +15,7 @@ from scipy.integrate import quad
 from forms.hencky import Linear, Log, UserLaw, energy_density, secant_stress, stress
 from forms.kinematics import deviator_squared, von_mises
 from forms.monotonicity import check_monotonicity
+from forms.plane_stress import hencky_of, in_plane_stress
 from tests.problems.materials import LAWS, XI
 
 every_law = pytest.mark.parametrize("name", LAWS)
@@ -213,3 +214,12 @@ def test_g_is_bounded_by_the_bulk_modulus(poisson, dim, holds):
     report = check_monotonicity(Linear(1.0, poisson), 0.1, dim=dim)
     assert (report.hardens, report.bounded, report.holds) == (True, holds, holds)
     assert report.ceiling == pytest.approx(dim / 2 / (3 - 6 * poisson))
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.499])
+def test_plane_stress_has_the_constants_of_its_material(poisson):
+    """They were means with the stiffness across, 28 times too large at 0.499."""
+    law, _ = in_plane_stress(Linear(2.0, poisson))
+    assert (law.young, law.poisson) == pytest.approx((2.0, poisson))
+    log = Log(2.0, 0.3, yield_strain=1e-3)
+    assert hencky_of(in_plane_stress(log)[0]) == log

@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import InputError, build_problem, solve, write_outputs
+from contact.case.file import with_number
 from contact.history import BodyState
 from contact.io.checkpoint import read_checkpoint
 from contact.problem.residuals import evaluate
@@ -112,6 +113,13 @@ def test_checkpoint(kind: str, shared_tmp_path: Path) -> None:
         problem = build_problem(case, comm)
         assert evaluate(problem, read_checkpoint(path, problem)).largest <= 1e-8
         MPI.COMM_WORLD.barrier()
+        if kind == "piezoelectric":  # potentials are those of the file, whatever their unit
+            stiffer = build_problem(with_number(case, "material.young", 4 * problem.scales.young))
+            assert stiffer.body.phi_scale == pytest.approx(2 * problem.body.phi_scale)
+            one, two = (read_checkpoint(path, p).x for p in (problem, stiffer))
+            size = problem.body.block_size
+            np.testing.assert_allclose(2 * two[size - 1 :: size], one[size - 1 :: size])
+            np.testing.assert_allclose(two[::size], one[::size])
     other = build_problem(block(2, fixed=[{"on": "left", "displacement": [0.0, 0.0]}]))
     with pytest.raises(InputError, match=r"\[other-checkpoint\]"):
         read_checkpoint(path, other)

@@ -78,3 +78,14 @@ def test_a_free_rotation():
 def test_a_motion_and_its_components_are_one_or_the_other():
     with pytest.raises(InputError, match=r"Rigid: motion: given .*accepted: .*or its components"):
         Rigid("top", Motion([0.0, "free"]), displacement=[0.1, 0.0])
+
+
+def test_values_of_an_entry_are_functions_of_time_together():
+    """A force beside a motion with t acts at once, as that of a load beside a formula."""
+    rigid = Rigid("top", displacement=["0.1*t", None], force=[0.0, -3.0])
+    for values, beside, expected in (
+        (rigid.values, rigid.forces, [0.05, 0.0, 0.0]),
+        (rigid.forces, rigid.values, [0.0, -3.0, 0.0]),
+    ):
+        found = numbers_at(values, rigid.amplitude, 0.5, beside)
+        np.testing.assert_allclose(found[:2], expected[:2])
