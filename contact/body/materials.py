@@ -82,7 +82,8 @@ class Softest(NamedTuple):
 def softest(domain: Domain, materials: Sequence[Material], cells: Sequence[Indices]) -> Softest:
     """Return the constants of the softest material in cells, with its factor. Collective."""
     least = [young.min(initial=np.inf) for young in _young(domain, materials, cells)]
-    youngs = domain.comm.allreduce(np.array(least), op=MPI.MIN)
+    youngs = np.array(least)
+    domain.comm.Allreduce(MPI.IN_PLACE, youngs, op=MPI.MIN)
     index = int(np.argmin(youngs))
     law, young = materials[index].law, float(youngs[index])
     factor = young / float(law.young)
