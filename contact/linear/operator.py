@@ -343,8 +343,16 @@ class SparseOperator:
         ksp = self.ksp if self._split is None else self._transposed_solver()
         ksp.setTolerances(rtol=self._tolerance if rtol is None else rtol)
         ksp.setInitialGuessNonzero(False)
-        solve = ksp.solveTranspose if self._split is None else ksp.solve
-        solve(self._rhs, self._solution)
+        if not self.iterative:
+            ksp.solveTranspose(self._rhs, self._solution)
+        elif self._split is not None:
+            ksp.solve(self._rhs, self._solution)
+        else:
+            # By the preconditioner itself: PETSc's SOR of blocks has no transpose.
+            system, preconditioned = ksp.getOperators()
+            ksp.setOperators(PETSc.Mat().createTranspose(system), preconditioned)
+            ksp.solve(self._rhs, self._solution)
+            ksp.setOperators(system, preconditioned)
         self._solved(ksp.getIterationNumber(), self._rhs.norm(), self._solution.norm())
         return self.layout.mask(self._solution.array)
 
