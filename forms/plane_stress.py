@@ -239,11 +239,17 @@ class HenckyAtPoints(_Around):
         return Response(stress, {}, stiffness, None, energy)
 
 
-def hencky_of(law: Law) -> Hencky | None:
-    """Return Hencky's nonlinear law of a material, in plane stress that of its points, or None."""
+def base_of(law: Law) -> Law:
+    """Return the law of a material in plane stress, or the law itself."""
     while isinstance(law, PlaneStressHistory | HenckyAtPoints):
         law = law.base
-    return None if isinstance(law, Anisotropic | HistoryLaw) else law
+    return law
+
+
+def hencky_of(law: Law) -> Hencky | None:
+    """Return the law of a material if it is Hencky's, with a secant modulus, or None."""
+    base = base_of(law)
+    return None if isinstance(base, Anisotropic | HistoryLaw) else base
 
 
 def in_plane_stress(law: Law, piezo: Piezo | None = None) -> tuple[Law, Piezo | None]:

@@ -42,7 +42,7 @@ from contact.linear.petsc import Subsystems
 from contact.linear.transformation import Transformation, TransformedBulk, TransformedOperator
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
-from contact.mesh.entities import component_sums, connected_components, graph_components, sums_at
+from contact.mesh.entities import component_sums, connected_components, graph_components
 from contact.ranks import summed
 from contact.tolerances import MOST_ROUNDING
 from contact.typing import Array
@@ -183,12 +183,13 @@ class BodyEquilibrium:
         coupled = [material.piezo is not None for material in body.materials]
         index_map = self.space.dofmap.index_map
         #: Mask of the owned nodes of piezoelectric cells.
-        self.electric_nodes = np.full(index_map.size_local, all(coupled))
+        self.electric_nodes = np.full(index_map.size_local, any(coupled))
         if any(coupled) and not all(coupled):
             charged = np.concatenate([self.cells[i] for i in np.flatnonzero(coupled)])
-            inside = sums_at(index_map, self.space.dofmap.list[charged], 1.0)
-            self.electric_nodes = inside[: index_map.size_local] > 0
-            self.supports.append(without_field(self.space, charged))
+            others = without_field(self.space, charged)
+            dofs, owned = others.condition.dof_indices()
+            self.electric_nodes[dofs[:owned] // self.block_size] = False
+            self.supports.append(others)
         #: Mask of the owned nodal unknowns without support, shape (nodes, block size).
         self.unsupported = free_components(self.space, self.supports)
         self.rollers = Rollers(domain, self.space, body, self.unsupported)

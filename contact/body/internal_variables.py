@@ -40,7 +40,7 @@ from forms.history import (
     with_stiffness,
 )
 from forms.kinematics import Strained, strain
-from forms.plane_stress import HenckyAtPoints, PlaneStressHistory
+from forms.plane_stress import PlaneStressHistory, base_of
 
 #: Names of variables, which are those of fields and of arrays in files.
 NAME = "an identifier of ASCII letters, digits and underscores"
@@ -56,11 +56,9 @@ VARIABLES = "material"
 OF_STRAIN = ""
 
 
-def name_of(law: object) -> str:
+def name_of(law: Law) -> str:
     """Return a law's class for messages, in plane stress that of its base."""
-    while isinstance(law, PlaneStressHistory | HenckyAtPoints):
-        law = law.base
-    return type(law).__name__
+    return type(base_of(law)).__name__
 
 
 def first_values(law: HistoryLaw, size: int) -> dict[str, Array]:

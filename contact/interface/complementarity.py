@@ -114,7 +114,7 @@ class ComplementarityParameters:
     c
         Complementarity parameter of the functions and of the active set.
     nodal_stiffness
-        kappa = 1.93 E'/h, an upper estimate of the stiffness of the body at one contact node.
+        kappa = 1.93 E'/h, an upper estimate of the stiffness of a node of the softest material.
     gamma
         Augmentation parameter of (19), far above the others; the solution does not depend on it.
     """

@@ -236,9 +236,7 @@ class _Reader:
 
     def read(self, path: Path) -> tuple[State, str]:
         """Return the state in a file, and the record beside it."""
-        problem, stored = self._problem, Arrays()
-
-        body = problem.body
+        problem, body, stored = self._problem, self._problem.body, Arrays()
 
         def begin() -> tuple[Array, float, str]:
             stored.update(_read(path))

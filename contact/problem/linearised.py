@@ -275,8 +275,8 @@ class Linearised:
                 layout = self.problem.body.layout
                 most = multigrid.LARGE[layout.dim, layout.piezoelectric]
                 raise InputError(
-                    "derivatives: the linear solves by multigrid do not converge; accepted: fewer "
-                    f"than {most:,} unknowns, which a direct solver takes",
+                    "derivatives: corrections of their linear solves do not converge; accepted: a "
+                    f"problem that is not nearly singular, or fewer than {most:,} unknowns",
                     "no-derivative",
                 )
             raise InputError(

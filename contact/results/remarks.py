@@ -34,7 +34,7 @@ from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 from forms.j2 import J2
 from forms.monotonicity import check_monotonicity
-from forms.plane_stress import PlaneStressHistory, hencky_of
+from forms.plane_stress import base_of, hencky_of
 
 logger = logging.getLogger("contact.solve")
 
@@ -246,8 +246,7 @@ def rounding(solution: Solution) -> Iterator[Remark]:
 
 def limit_load(solution: Solution) -> Iterator[Remark]:
     """Tell that a body without hardening has a limit load, where a method fails."""
-    laws = [material.law for material in solution.problem.description.materials]
-    laws = [law.base if isinstance(law, PlaneStressHistory) else law for law in laws]
+    laws = [base_of(material.law) for material in solution.problem.description.materials]
     perfect = any(
         isinstance(law, J2) and not law.kinematic and law.strength(np.ones(1)) == law.yield_stress
         for law in laws

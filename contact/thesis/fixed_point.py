@@ -9,14 +9,12 @@ the minimum (3.31) of J_n + j_n on K. With a potential it is a saddle point of x
 in u and greatest in phi, with B-check, f_3-check and l-check, (5.28)-(5.32) and (6.33); the thesis
 calls J_n strictly convex, which holds once phi is eliminated. The friction bound
 s_{n+1} = mu(|u_tau|) |R sigma_nu| (`_update_bound`) and, as
-printed, the load follow:
+printed, the load follow, with f_3-check and l-check for f_3 and l if there is a potential:
 
     f                                           Algorithm 1, Problem (PV)
     f_n     = f_3 - l(x_n, .)                   Algorithm 4, Problem (P~V), with charge
     f_{1,n} = f_3 - j_1(x_n, .) - l(x_n, .)     Algorithm 6, Problem (PV2), with a layer
     f_{2,n} = f_3 - j_1(x_n, .)                 Algorithm 8, Problem (PV1), without friction
-
-with f_3-check and l-check for f_3 and l.
 
 These are loads of `FrozenProblem` where charge and layer are `lagged`. By default psi and h_nu
 alone are those of x_n, tangents follow near the solution, and residuals end the loop: the options

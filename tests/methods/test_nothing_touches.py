@@ -5,6 +5,7 @@ What is unloaded to next to nothing, or to nothing.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from mpi4py import MPI
 from contact import Problem, build_problem, evolve, solve
 from contact.body.description import Body
 from contact.case.file import parse_case
+from contact.mesh.geometry import geometry_nodes
 from contact.mesh.grid import rectangle
 from contact.methods.load_stepping import LoadStepping
 from contact.methods.method import METHODS
@@ -272,20 +274,23 @@ def test_a_penalised_body_that_is_unloaded_to_nothing_rests():
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("ratio", [1e-3, 1e-8])
+@pytest.mark.parametrize("ratio", [1e-5, 1e-8])
 @pytest.mark.parametrize("on", ["outer0", "inner1"])
 def test_soft_bodies_have_a_scale_of_their_own(on, ratio):
     """Their forces were rounding beside those of a stiff body that moves: nothing touched."""
     gap, push = 1e-3, 5e-3
-    domain = layers(COMM, "quadrilateral", 1, "flat", -gap)
-    material = Material(
-        Linear(YOUNG, POISSON), factor=lambda x: np.where(x[0] < 1.5 + gap / 2, ratio, 1.0)
-    )
+    domain = layers(COMM, "quadrilateral", 1, "flat", -gap, counts=(12, 16))
+    places = geometry_nodes(domain).mean(axis=1)[:, 0]
+    soft = places[: domain.mesh.topology.index_map(2).size_local] < 1.5
+    regions = {"soft": np.flatnonzero(soft), "hard": np.flatnonzero(~soft)}
+    domain = replace(domain, regions={k: v.astype(np.int32) for k, v in regions.items()})
+    laws = {"soft": Linear(ratio * YOUNG, POISSON), "hard": Linear(YOUNG, POISSON)}
+    materials = [Material(law, on=name) for name, law in laws.items()]
     held = [*body("flat", 2, 2).fixed[:-1], Fixed("outer1", [-push, None])]
     against = {"outer0": "inner1", "inner1": "outer0"}[on]
-    problem = Problem(domain, Body(material, held), Contact(on, against=against))
-    for options in (NewtonOptions(tolerance=min(ratio, 1e-6)), FixedPointOptions()):
+    problem = Problem(domain, Body(materials, held), Contact(on, against=against))
+    for options in (NewtonOptions(tolerance=100 * ratio), FixedPointOptions()):
         solution = solve(problem, options)
         assert solution.converged
         exact = UNIAXIAL * (push - gap) / 0.5 / (1 + 1 / ratio)
-        np.testing.assert_allclose(solution.pressure, exact, rtol=1e-5)
+        np.testing.assert_allclose(solution.pressure, exact, rtol=max(1e-5, 100 * ratio))
