@@ -15,7 +15,7 @@ ROUNDING = 500 * EPS
 #: more, and rigid-body modes from an orthogonal basis an error of about a root of `EPS`.
 NEGLIGIBLE = 1e-9
 
-#: Overlap of two bodies, over the size of the mesh, that is rounding of the positions in files.
+#: Overlap of two bodies, over the thickness of the thinner one, that counts as rounding.
 TOUCHING = 1e-6
 
 #: The least tolerance of relative residuals: the size of their rounding errors.

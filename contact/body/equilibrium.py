@@ -42,9 +42,17 @@ from contact.linear.petsc import Subsystems
 from contact.linear.transformation import Transformation, TransformedBulk, TransformedOperator
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
-from contact.mesh.entities import component_sums, connected_components, graph_components
+from contact.mesh.entities import (
+    cells_at,
+    component_sums,
+    connected_components,
+    exterior_facets,
+    graph_components,
+    with_ghosts,
+)
+from contact.mesh.geometry import areas, volumes
 from contact.ranks import summed
-from contact.tolerances import MOST_ROUNDING
+from contact.tolerances import MOST_ROUNDING, NEGLIGIBLE, TOUCHING
 from contact.typing import Array
 
 
@@ -235,6 +243,48 @@ class BodyEquilibrium:
     def free(self) -> NDArray[np.bool_]:
         """Mask of the owned nodal unknowns that are neither fixed nor tied, (nodes, block size)."""
         return self.layout.free
+
+    @cached_property
+    def extents(self) -> Array:
+        """Largest extents of the connected components, shape (k,) (length). Collective."""
+        component, count = self.components
+        if count == 1:
+            return np.array([self.domain.size])
+        low = np.full((count, self.dim), np.inf)
+        high = -low
+        np.minimum.at(low, component, self.layout.points)
+        np.maximum.at(high, component, self.layout.points)
+        self.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
+        self.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+        return np.asarray((high - low).max(axis=1))
+
+    @cached_property
+    def rounding(self) -> Array:
+        """Overlaps with connected components that are rounding, (k,) (length). Collective.
+
+        The thickness of a component is twice its volume over its boundary's area.
+        """
+        domain, (component, count) = self.domain, self.components
+        dofmap, facets = self.space.dofmap, exterior_facets(self.domain.mesh)
+        of_nodes = np.zeros(dofmap.index_map.size_local + dofmap.index_map.num_ghosts, dtype=int)
+        of_nodes[: component.size] = component
+        of_cells = with_ghosts(dofmap.index_map, of_nodes)[dofmap.list[:, 0]]
+        volume = volumes(domain)
+        boundary = of_cells[cells_at(domain.mesh, facets)[0]]
+        thickness = 2 * component_sums(self.comm, of_cells[: volume.size], volume, count)
+        thickness /= component_sums(self.comm, boundary, areas(domain, facets), count)
+        return np.maximum(TOUCHING * thickness, NEGLIGIBLE * domain.size)
+
+    def components_of(self, *parts: str) -> NDArray[np.bool_]:
+        """Return which connected components have facets of boundary parts, (k,). Collective."""
+        component, count = self.components
+        met = np.zeros(count, dtype=bool)
+        for part in parts:
+            facets = self.domain.facets_anywhere(part)
+            nodes = fem.locate_dofs_topological(self.space, self.dim - 1, facets)
+            met[component[nodes[nodes < component.size]]] = True
+        self.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.LOR)
+        return met
 
     @property
     def owned(self) -> int:

@@ -202,16 +202,18 @@ def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
     if count == 1:
         return []
     bodies = labels[space.dofmap.list[:, 0]]
-    sides = {name: _side(domain, name, bodies) for name in domain.parts}
-    own = {name: side for name, side in sides.items() if np.unique(side.body).size == 1}
+    parts = {name: _side(domain, name, bodies) for name in domain.parts}
+    own = {name: side for name, side in parts.items() if np.unique(side.body).size == 1}
     # The finer side of a pair is its first, of alike ones the first by name.
     finest = sorted(own, key=lambda name: (float(f"{own[name].size.mean():.9e}"), name))
     found = []
     for one, other in itertools.combinations(finest, 2):
         if own[one].body[0] != own[other].body[0]:
-            gap = _least_gap(own[one], own[other], REACH * domain.size)
+            sides = own[one], own[other]
+            gap = _least_gap(*sides, REACH * domain.size)
             if np.isfinite(gap):
-                found.append((0.0 if abs(gap) <= TOUCHING * domain.size else gap, one, other))
+                touching = TOUCHING * min(side.height.min() for side in sides)
+                found.append((0.0 if abs(gap) <= touching else gap, one, other))
     return sorted(found)
 
 

@@ -61,8 +61,8 @@ class Interface:
     fixed_conducting
         The charge at nodes without a free displacement, but with a free potential, or None.
     c_0
-        Reference stiffness c_0 = E/size (stress/length), E behind Gamma_3: the complementarity
-        parameter of the active set of a solution.
+        Reference stiffness c_0 = E/L (stress/length), E behind Gamma_3, L the extent of the
+        smallest body there: the complementarity parameter of the active set of a solution.
     size
         Largest extent of the body (length).
     elongation

@@ -27,7 +27,7 @@ from contact.mesh.entities import exterior_facets
 from contact.mesh.geometry import geometry_nodes, nearest_on_simplices, pulled_back
 from contact.mesh.owners import Owners
 from contact.ranks import bounding_boxes, exchanged
-from contact.tolerances import NEGLIGIBLE, TOUCHING
+from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
 #: Distance along a further axis, over the size of the mesh, by which searches keep bodies apart.
@@ -59,10 +59,11 @@ def overlap_depths(
     number, other = bodies.inside(*bodies.points)
     facet, place = np.divmod(number, len(bodies.places))
     depth, on_sides = bodies.depths(facet, place, other)
-    own, rounding = bodies.component[facet], TOUCHING * body.domain.size
+    own = bodies.component[facet]
     twins = bodies.twins()
     own, other, depth = (np.append(a, b) for a, b in zip((own, other, depth), twins, strict=True))
     on_sides = np.pad(on_sides, ((0, len(own) - len(on_sides)), (0, 0)))
+    depth[depth <= np.minimum(body.rounding[own], body.rounding[other])] = 0.0
     between = bodies.between(own, other)
     press = np.array([press for *_, press in pairs], dtype=bool)
     elsewhere = (on_sides & press).any(axis=1, keepdims=True) & ~press
@@ -71,8 +72,7 @@ def overlap_depths(
     both = np.stack([of_sides, beside], axis=2)
     deepest = np.where(both, depth[:, None, None], 0.0).max(axis=0, initial=0.0)
     body.comm.Allreduce(MPI.IN_PLACE, deepest, op=MPI.MAX)
-    deepest[deepest <= rounding] = 0.0
-    alone = np.flatnonzero(~between.any(axis=1) & (depth > rounding))
+    alone = np.flatnonzero(~between.any(axis=1) & (depth > 0))
     alone = alone[np.argsort(depth[alone])]  # the deepest of two bodies comes last
     two = np.sort(np.column_stack([own, other])[alone], axis=1)
     deep = zip(*two.T, depth[alone], strict=True)
@@ -170,7 +170,8 @@ class _Boundaries:
         # No point of the boundary of either is within the other, but any other point is.
         low, high = self.boxes
         off = np.maximum(*(np.abs(x[:, None] - x).max(axis=2) for x in (low, high)))
-        alike = np.count_nonzero(off <= TOUCHING * self.body.domain.size, axis=1) > 1
+        rounding = self.body.rounding
+        alike = np.count_nonzero(off <= np.minimum.outer(rounding, rounding), axis=1) > 1
         if not alike.any():
             none = np.zeros(0, dtype=np.intp)
             return none, none, np.zeros(0)
@@ -228,9 +229,10 @@ class _Boundaries:
 
     def _near(self, x: Array, of: Numbers) -> NDArray[np.bool_]:
         """Return which points of bodies are in boxes of other ones. Collective."""
-        rounding, near = TOUCHING * self.body.domain.size, np.zeros(len(x), dtype=bool)
+        rounding, near = self.body.rounding, np.zeros(len(x), dtype=bool)
         for body, (low, high) in enumerate(zip(*self.boxes, strict=True)):
-            held = np.all((x > low + rounding) & (x < high - rounding), axis=1)
+            touching = np.minimum(rounding[of], rounding[body])[:, None]
+            held = np.all((x > low + touching) & (x < high - touching), axis=1)
             near |= held & (of != body)
         return near
 

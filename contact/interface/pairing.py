@@ -27,7 +27,7 @@ from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle
 from contact.model.obstacle.shapes import measured
-from contact.tolerances import ROUNDING, TOUCHING
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 #: Share of a facet that faces the master, if its nodes are not beyond the rim of that.
@@ -49,6 +49,7 @@ class PairPlacement:
     nodes: NDArray[np.int64]  #: global numbers of this rank's nodes with a multiplier, (n,)
     added: Array  #: gap at `nodes` beside that between the meshes, shape (n,) (length)
     press: bool  #: whether overlaps in the reference configuration are interferences
+    rounding: float  #: overlap that counts as rounding (length)
 
     def at(self, displacement: Array) -> Geometry:
         """Return the geometry at a displacement of the owned nodes, shape (nodes, d). Collective.
@@ -65,8 +66,9 @@ class PairPlacement:
         _, local = owned_among(body.layout.index_map, self.nodes)
         points = body.space.tabulate_dof_coordinates()[local, : body.dim]
         gap, cut = coupling.gap, 0.0
-        if not self.press and coupling.depth <= TOUCHING * body.domain.size:
-            gap, cut = _without_sagittas(body, coupling)
+        if not self.press and coupling.depth <= self.rounding:
+            gap, cut = _without_sagittas(body.comm, coupling)
+            cut = cut if cut > self.rounding else 0.0
         unknown = body.comm.allreduce(
             max(side.unknown_deviation for side in (slave, master)), op=MPI.MAX
         )
@@ -91,13 +93,13 @@ class PairPlacement:
         return Geometry(nodes, coupling, coupling.covered)
 
 
-def _without_sagittas(body: BodyEquilibrium, coupling: Coupling) -> tuple[Array, float]:
+def _without_sagittas(comm: MPI.Intracomm, coupling: Coupling) -> tuple[Array, float]:
     """Return the gaps of sides that touch, and the largest depth that is left out. Collective."""
     # Chords of two curved sides that touch cut each other by their sagittas, which are no overlap:
     # g_j = max(g_j, min(w_j^-1 int Phi_j max(g, 0), 0)), below 0 where Phi_j alone is negative.
     least = np.minimum(coupling.gap_positive_part, 0.0)
-    cut = body.comm.allreduce(float(np.max(least - coupling.gap, initial=0.0)), op=MPI.MAX)
-    return np.maximum(coupling.gap, least), cut if cut > TOUCHING * body.domain.size else 0.0
+    cut = comm.allreduce(float(np.max(least - coupling.gap, initial=0.0)), op=MPI.MAX)
+    return np.maximum(coupling.gap, least), cut
 
 
 def find_pair(
@@ -158,20 +160,18 @@ def find_pair(
             "pair",
         )
     _check_apart(body, coupling, slave.owners, label)
-    _check_overlap(body, coupling, (slave, master), added, overlap, press, alone, label)
+    rounding = float(body.rounding[body.components_of(part, against)].min())
     placement = PairPlacement(
-        body, slave, master, reach, no_multiplier, coupling.nodes, added, press
+        body, slave, master, reach, no_multiplier, coupling.nodes, added, press, rounding
     )
+    _check_overlap(placement, coupling, overlap, alone, label)
     return placement, placement.geometry(slave, master, coupling)
 
 
 def _check_overlap(
-    body: BodyEquilibrium,
+    pair: PairPlacement,
     coupling: Coupling,
-    sides: tuple[Surface, Surface],
-    added: Array,
     overlap: Depths,
-    press: bool,
     alone: NDArray[np.bool_],
     label: str,
 ) -> None:
@@ -179,9 +179,9 @@ def _check_overlap(
 
     `alone`: partly covered facets without a neighbour that faces the master, shape (f,).
     """
-    rounding, owners = TOUCHING * body.domain.size, sides[0].owners
-    least = body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
-    depth, resolved = coupling.interference(owners, added)
+    body, rounding, owners = pair.body, pair.rounding, pair.slave.owners
+    least = body.comm.allreduce(float(pair.added.min(initial=np.inf)), op=MPI.MIN)
+    depth, resolved = coupling.interference(owners, pair.added)
     inside, beside = overlap
     depth = max(depth, max(overlap) - max(least, 0.0))
     # Sides that do not face each other see nothing of an overlap, nor of one beside them.
@@ -189,7 +189,7 @@ def _check_overlap(
     coarse = bool((alone & (coupling.depths > least + rounding)).any())
     resolved &= not body.comm.allreduce(coarse, op=MPI.LOR)
     drawn = max(coupling.depth, *overlap) > rounding
-    if depth <= rounding or (resolved and (press or not drawn)):
+    if depth <= rounding or (resolved and (pair.press or not drawn)):
         return
     if drawn and _connected(body, coupling, owners):
         raise InputError(
@@ -197,7 +197,8 @@ def _check_overlap(
             "two bodies whose meshes are apart",
             "pair",
         )
-    raise _overlap(depth, drawn, resolved, label, drawn and any([_turns(side) for side in sides]))
+    turns = drawn and any([_turns(side) for side in (pair.slave, pair.master)])
+    raise _overlap(depth, drawn, resolved, label, turns)
 
 
 def _turns(side: Surface) -> bool:

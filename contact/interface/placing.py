@@ -29,9 +29,9 @@ from contact.model.obstacle.shapes import measured
 from contact.ranks import on_all_ranks
 from contact.typing import Array
 
-#: Depth in a shape, over the size of the mesh, that is taken for rounding: its numbers are written
-#: by hand, with fewer digits than positions in files.
-ROUNDED = 1e-5
+#: Depth in a shape that counts as rounding, over that in a body: numbers of shapes are written by
+#: hand, with fewer digits than positions in files.
+BY_HAND = 10
 
 #: Degree of the rule at whose points facets are compared with a shape.
 WITHIN = 20
@@ -51,6 +51,7 @@ class Candidates:
     #: Depth of the nodes, shape (n,) (length), in a shape that the curved surface, or the straight
     #: facets, touch, and rounding.
     chord_penetration: Array
+    rounding: float  #: depth in a shape that counts as rounding (length)
     direction: Array  #: the contact direction, shape (n, d)
     measured: Array  #: the gap from `front`, shape (n,)
     gap: Array  #: from the curve through the corners, shape (n,)
@@ -73,7 +74,12 @@ class Candidates:
 
 
 def find_candidates(
-    body: BodyEquilibrium, facets: Surface, obstacle: Obstacle, displacement: Array, key: str
+    body: BodyEquilibrium,
+    part: str,
+    facets: Surface,
+    obstacle: Obstacle,
+    displacement: Array,
+    key: str,
 ) -> Candidates:
     """Return the nodes of a part at a place, and the obstacle as they see it. Collective.
 
@@ -81,6 +87,7 @@ def find_candidates(
     shape (nodes, d).
     """
     comm, lumped = body.comm, Lumping.of(facets).without_axis(facets)
+    rounding = _rounding(body, part)
     # Functions without a mean on Gamma_3 carry nothing: P2 vertices on the axis of revolution.
     size = np.array([lumped.weight.sum(), lumped.weight.size])
     area, count = comm.allreduce(size, op=MPI.SUM)
@@ -115,7 +122,8 @@ def find_candidates(
         facing=np.einsum("ni,ni->n", direction, normal),
         front=front,
         # The contact direction may differ a little from the normal.
-        chord_penetration=ROUNDED * body.domain.size + 1.1 * chord_penetration,
+        chord_penetration=rounding + 1.1 * chord_penetration,
+        rounding=rounding,
         direction=direction,
         measured=gap,
         gap=curved,
@@ -123,6 +131,11 @@ def find_candidates(
         owners=facets.owners,
         jumps=lumped.jumps,
     )
+
+
+def _rounding(body: BodyEquilibrium, part: str) -> float:
+    """Return the depth of a part in a shape that counts as rounding (length). Collective."""
+    return BY_HAND * float(body.rounding[body.components_of(part)].min())
 
 
 def _from_curve(
@@ -159,7 +172,7 @@ class FoundationPlacement:
     def refuse_unresolved(self) -> None:
         """Refuse a shape that cuts facets between their nodes. Collective."""
         try:
-            _refuse_unresolved(self.body.domain, self.obstacle, self.facets)
+            _refuse_unresolved(self.obstacle, self.facets, _rounding(self.body, self.part))
         except InputError as error:
             raise error.within(f"{self.key}.") from None
 
@@ -170,7 +183,7 @@ class FoundationPlacement:
         """
         facets = self.facets.moved(displacement)
         return self.geometry(
-            find_candidates(self.body, facets, self.obstacle, displacement, self.key)
+            find_candidates(self.body, self.part, facets, self.obstacle, displacement, self.key)
         )
 
     def geometry(self, candidates: Candidates) -> Geometry:
@@ -194,7 +207,7 @@ class FoundationPlacement:
             gap=candidates.of_jumps(gap)[self.contact],
             deviation=candidates.unknown[self.contact],
             block_size=body.block_size,
-            cut=cut if cut > ROUNDED * body.domain.size else 0.0,
+            cut=cut if cut > candidates.rounding else 0.0,
             revolved=body.domain.revolved,
             motion=body.global_unknowns.of_foundation(
                 candidates.places[self.contact], body.block_size, self.part
@@ -245,14 +258,14 @@ def find_nodes(
     """
     comm, facets = body.comm, surface_of(body.domain, body.space, part)
     zero = np.zeros((body.layout.index_map.size_local, body.dim))
-    candidates = find_candidates(body, facets, obstacle, zero, key)
+    candidates = find_candidates(body, part, facets, obstacle, zero, key)
     if obstacle.is_shape:
         try:
             _refuse_behind(body, obstacle, facets, candidates)
-            _refuse_within(body.domain, obstacle, candidates)
+            _refuse_within(body.comm, obstacle, candidates)
             if not press:  # an adaptive run starts on facets that hide the shape
                 _refuse_overlap(body, candidates)
-                _refuse_unresolved(body.domain, obstacle, facets)
+                _refuse_unresolved(obstacle, facets, candidates.rounding)
         except InputError as error:
             raise error.within(f"{key}.") from None
     else:
@@ -323,7 +336,7 @@ def _refuse_behind(
     best = body.comm.allreduce(np.max(candidates.facing[seen], initial=-np.inf), op=MPI.MAX)
     if np.isfinite(best) and best <= 1e-9:
         # Nodes beside a punch that is within facets see it sideways.
-        _refuse_unresolved(body.domain, obstacle, facets, facing=False)
+        _refuse_unresolved(obstacle, facets, candidates.rounding, facing=False)
         raise InputError(
             "foundation: it lies behind the contact part: the contact direction points "
             "into the body at every node; accepted: a normal towards the body, a shape in front "
@@ -332,16 +345,16 @@ def _refuse_behind(
         )
 
 
-def _refuse_within(domain: Domain, obstacle: Obstacle, candidates: Candidates) -> None:
+def _refuse_within(comm: MPI.Intracomm, obstacle: Obstacle, candidates: Candidates) -> None:
     """Refuse nodes in a shape from which the contact direction leads on through it. Collective."""
     # It meets a far side, or nothing, and nodes that touch would seem to be open.
     if not isinstance(obstacle, Shape):
         return
-    rounding, facing = ROUNDED * domain.size, candidates.facing > 0
-    with on_all_ranks(domain.comm), naming("foundation"):
+    rounding, facing = candidates.rounding, candidates.facing > 0
+    with on_all_ranks(comm), naming("foundation"):
         within = obstacle.distance(candidates.front[facing])[0] < -rounding
         within &= candidates.measured[facing] > rounding
-    count = domain.comm.allreduce(np.count_nonzero(within))
+    count = comm.allreduce(np.count_nonzero(within))
     if count > 0:
         raise InputError(
             f"foundation: {counted(count, 'contact node')} within it, and the contact direction "
@@ -360,14 +373,14 @@ def _refuse_overlap(body: BodyEquilibrium, candidates: Candidates) -> None:
     if body.comm.allreduce(bool(np.any(depth > candidates.chord_penetration)), op=MPI.LOR):
         raise InputError(
             f"foundation: the undeformed body cuts it, by up to {cut:.3g}; accepted: gaps "
-            f">= 0 but for {ROUNDED * body.domain.size:.1g} (rounding), and the deviation of "
+            f">= 0 but for {candidates.rounding:.1g} (rounding), and the deviation of "
             'facets from a curve, or overlap = "press"',
             "overlap",
         )
 
 
 def _refuse_unresolved(
-    domain: Domain, obstacle: Obstacle, facets: Surface, facing: bool = True
+    obstacle: Obstacle, facets: Surface, rounding: float, facing: bool = True
 ) -> None:
     """Refuse shapes that cut facets between their nodes, deeper than at these. Collective.
 
@@ -375,12 +388,12 @@ def _refuse_unresolved(
     """
     if not isinstance(obstacle, Shape):
         return
-    comm, shape = domain.comm, facets.shape
+    comm, shape = facets.owners.comm, facets.shape
     at = np.concatenate([shape.nodes(2), shape.middle, rule(shape, WITHIN)[0]])
     with on_all_ranks(comm), naming("foundation"):
         near = np.flatnonzero(obstacle.distance(facets.centres)[0] < 2 * facets.radii)
-        x = (shape.lagrange(facets.order, at) @ facets.points[near]).reshape(-1, domain.dim)
-        distance, outward = obstacle.distance(x)
+        x = shape.lagrange(facets.order, at) @ facets.points[near]
+        distance, outward = obstacle.distance(x.reshape(-1, x.shape[2]))
     facet, reference = np.repeat(near, len(at)), np.tile(at, (near.size, 1))
     normal = facets.normal[facet]
     # No overlap where the facets, or the surfaces that they approximate, have none.
@@ -391,7 +404,7 @@ def _refuse_unresolved(
     deepest = depths.max(axis=1)
     depth = comm.allreduce(float(deepest.max(initial=0.0)), op=MPI.MAX)
     missed = (deepest > depth / 2) & (nodes < RESOLVED * depth)
-    if comm.allreduce(bool(missed.any()), op=MPI.LOR) and depth > ROUNDED * domain.size:
+    if comm.allreduce(bool(missed.any()), op=MPI.LOR) and depth > rounding:
         raise InputError(
             f"foundation: it cuts facets of the undeformed body between their nodes, by up to "
             f"{depth:.3g}; accepted: shorter facets there, a shape that is apart or touches",

@@ -180,14 +180,19 @@ def volume(domain: Domain, region: str | None = None) -> float:
 
 def area(domain: Domain, part: str) -> float:
     """Return the area of a part of the boundary; in the plane its length. Collective."""
-    cells, place = cells_at(domain.mesh, domain.facets(part))
+    own = areas(domain, domain.facets(part))
+    return float(domain.comm.allreduce(float(own.sum()), op=MPI.SUM))
+
+
+def areas(domain: Domain, facets: NDArray[np.int32]) -> Array:
+    """Return the areas of boundary facets of this rank, of revolution of rings, shape (f,)."""
+    cells, place = cells_at(domain.mesh, facets)
     shape = shape_of(domain.mesh)
     ends = shape.facet_nodes(domain.order)[place]
     nodes = np.take_along_axis(geometry_nodes(domain, cells), ends[:, :, None], axis=1)
     straight = shape.facet.simplex and domain.order == 1
     points, weights = rule(shape.facet, 1 if straight else FINE)
-    own = integration_weights(domain.revolved, shape.facet, nodes, points, weights)
-    return float(domain.comm.allreduce(float(own.sum()), op=MPI.SUM))
+    return integration_weights(domain.revolved, shape.facet, nodes, points, weights).sum(axis=1)
 
 
 def volumes(domain: Domain) -> Array:

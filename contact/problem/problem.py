@@ -276,11 +276,18 @@ class ContactProblem:
         sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
         return max(min(young_behind(*where, side) for side in both) for both in sides)
 
+    @cached_property
+    def contact_size(self) -> float:
+        """Extent of the smallest body at a contact (length). Collective."""
+        names = [name for c in self.contacts for name in (c.on, c.against) if name is not None]
+        body = self.body
+        return float(body.extents[body.components_of(*names)].min())
+
     def _interface(self) -> Interface:
         """Return the laws of all contacts at their geometries. Collective."""
         body, geometries = self.body, self.geometries
         nodes = joined_nodes(geometries, [contact.on for contact in self.contacts], body)
-        stiffness = self.contact_young / self.domain.size
+        stiffness = self.contact_young / self.contact_size
         conductors = [contact.conductor for contact in self.contacts]
         law = FoundationLaw(
             nodes=nodes,

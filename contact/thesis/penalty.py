@@ -337,7 +337,7 @@ def regularisation(problem: ContactProblem, options: PenaltyOptions) -> Regulari
         displacement = max(*expected_displacements(problem, *added), LEAST_ADDED * displacement)
     slip = 1e-2 * displacement or 1e-6 * scales.size
     # Modulus of the part in contact, however soft its support is.
-    young = problem.interface.c_0 * scales.size
+    young = scales.contact_young
     contact, slip = 1e-2 * scales.spacing / young, slip * min(1.0, scales.young / young)
     if options.eps_contact is not None:
         contact = slip = options.eps_contact

@@ -105,6 +105,50 @@ def test_bodies_that_touch_are_accepted(cell, element):
                 assert nodes.cut > 1e-3  # longer chords of the bore
 
 
+#: Ends of two layers of half a thousandth of the mesh, whose third layer reaches to 1.
+SMALL = (1e-3, 1.5e-3, 2e-3, 1.0)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("cell", PLANE)
+@pytest.mark.parametrize("form", ["flat", "tube", "ring"])
+def test_overlaps_of_small_bodies_beside_a_large_one(form, cell, element):
+    """What counts as rounding is measured by the thinner body, not by the whole mesh."""
+    order, degree = element
+    given, count = body(form, 2, 3), {"flat": 4, "tube": 8, "ring": 32}[form]
+    if form == "flat":
+        given = Body(given.materials, [*given.fixed, Fixed("outer1", [0.0, 0.0])])
+    for depth in (1e-8, 0.9e-6):
+        domain = layers(COMM, cell, order, form, [depth, -0.1], SMALL, (count, count + 1, 3))
+        # Beside curves the smaller depth is within the error of the facets' curves.
+        if form != "ring" or depth > 1e-7:
+            told(domain, given, Contact(**BETWEEN), degree, 'overlap = "press"')
+        contact = Contact(**BETWEEN, press=True)
+        solution = solve(Problem(domain, given, contact, degree=degree))
+        assert solution.converged
+        if form == "flat":
+            stretch = depth / (SMALL[2] - SMALL[0])
+            assert mean(solution) == pytest.approx(UNIAXIAL * stretch, rel=1e-6)
+        elif form == "tube":
+            assert mean(solution) == pytest.approx(pressure(form, depth, SMALL[:3]), rel=0.01)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+def test_depths_of_small_bodies_in_shapes(degree):
+    """A rigid plane or tube in a body of half a thousandth of the mesh."""
+    for form, shape in (("flat", Plane), ("ring", Sphere)):
+        domain = layers(COMM, "quadrilateral", 2, form, [0.0, -0.1], SMALL, (16, 16, 3))
+        given = body(form, 2, 3)
+        given = Body(given.materials, [*given.fixed, Fixed("inner0", [0.0, 0.0])])
+        for depth in (5e-8, 5e-6):
+            end = SMALL[1] + depth
+            foundation = Plane((end, 0.0), (1.0, 0.0)) if shape is Plane else Sphere((0, 0), end)
+            with pytest.raises(InputError, match=r"\[overlap\]"):
+                Problem(domain, given, Contact("inner1", foundation), degree=degree)
+
+
 @pytest.mark.parallel
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("cell", [*PLANE, *SPACE])
