@@ -18,7 +18,7 @@ from contact.body.supports import APART
 from contact.errors import InputError
 from contact.interface.mortar.coupling import LEAST_COVERED, Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis
-from contact.interface.mortar.surface import Surface, surface_of
+from contact.interface.mortar.surface import Surface, dual_basis_transformation, surface_of
 from contact.interface.nodes import ContactNodes, Geometry, contact_directions
 from contact.interface.overlaps import Depths
 from contact.interface.placing import check_gap
@@ -117,7 +117,8 @@ def find_pair(
     A node whose normal is fixed by a Dirichlet condition is left out, and its multiplier is handed
     over to its neighbours. With friction that is so too where a tangential component is fixed, but
     not on the other side, on which it would act; where both are, or there is no friction, it is
-    removed from the tangent projector. Nodes that face nothing are left out.
+    removed from the tangent projector. Handed over too are the multipliers of nodes whose functions
+    barely face the master, but on triangles of degree 2; nodes that face nothing are left out.
 
     `distance` is added to the gap between the meshes; with `press` the bodies may overlap in the
     reference configuration, and press each other out. `overlap` has the depths of the boundary of
@@ -136,6 +137,7 @@ def find_pair(
     coupling = couple(slave, master, reach)
     beyond, alone = _beyond_rim(slave, coupling)
     no_multiplier: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+    change = dual_basis_transformation(slave.shape, slave.degree)
     while True:
         _, local = owned_among(body.layout.index_map, coupling.nodes)
         points = body.space.tabulate_dof_coordinates()[local, : body.dim]
@@ -145,6 +147,8 @@ def find_pair(
         lost = _without_multiplier(body, slave, coupling, label, part if friction else None)
         if press or least < 0:
             lost = np.union1d(lost, beyond)
+        if np.array_equal(change, np.eye(len(change))):  # else nodes would follow each other
+            lost = np.union1d(lost, slave.owners.among(coupling.barely, slave.nodes.ravel()))
         new = np.setdiff1d(lost, no_multiplier)
         if body.comm.allreduce(new.size, op=MPI.SUM) == 0:
             break

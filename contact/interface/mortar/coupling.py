@@ -234,7 +234,8 @@ def _master_entries(
     return rows.ravel(), columns.ravel(), values.ravel()
 
 
-#: Share of a node's function that faces the master, below which the node has no multiplier.
+#: Share of a node's function that faces the master, up to which the node has no multiplier: at
+#: degree 2 it may be negative on partly covered facets.
 LEAST_COVERED = 1e-3
 
 #: Least share of an overlap in the gaps at nodes, where facets are short enough to resolve it.
@@ -272,6 +273,9 @@ class Coupling(JumpRows):
         Of the deepest overlap on each of these; below 0 the least distance, shape (f,) (length).
     faces
         Share of each of these that faces the master, shape (f,).
+    barely
+        Global numbers of the nodes of this rank whose functions face the master, but by less than
+        a multiplier takes.
     """
 
     weight: Array
@@ -284,6 +288,7 @@ class Coupling(JumpRows):
     dual_nodes: NDArray[np.int64]
     depths: Array
     faces: Array
+    barely: NDArray[np.int64]
 
     def interference(self, owners: Owners, added: Array) -> tuple[float, bool]:
         """Return the largest depth of the overlap less an added gap at nodes (length). Collective.
@@ -358,6 +363,7 @@ def _assembled(
     weight, whole, around = areas.T
     has_area = whole > NEGLIGIBLE * around
     covered = np.where(has_area, weight / np.where(has_area, whole, 1.0), 0.0)
+    barely = numbers[(np.abs(weight) > NEGLIGIBLE * around) & (covered <= LEAST_COVERED)]
     if nodes is None:
         nodes = numbers[(covered > LEAST_COVERED) & ~np.isin(numbers, no_multiplier)]
     kept = np.searchsorted(numbers, nodes)
@@ -394,4 +400,4 @@ def _assembled(
     state = weight, normal, gap, positive_part, curved_gap, covered[kept]
     whole_facets = parts.whole.sum(axis=1)
     faces_master = parts.facet_mass.sum(axis=(1, 2)) / np.where(whole_facets > 0, whole_facets, 1.0)
-    return Coupling(*jumps, *state, depth, parts.dual_nodes, parts.depths, faces_master)
+    return Coupling(*jumps, *state, depth, parts.dual_nodes, parts.depths, faces_master, barely)
