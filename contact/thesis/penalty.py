@@ -261,7 +261,10 @@ class PenalisedProblem:
         closest = nodes.maximum(penetration, -np.inf)
         if closest >= 0:
             return np.zeros_like(body.owned_part(state.x))
-        stiffness = (penetration >= closest - 1e-9 * interface.size) / self._eps.contact
+        # At nodes that face nothing it is infinite, and zero times it no number.
+        facing = np.isfinite(penetration)
+        stiffness = (facing & (penetration >= closest - 1e-9 * interface.size)) / self._eps.contact
+        penetration = np.where(facing, penetration, 0.0)
         n, d = nodes.normal.shape
         blocks = np.zeros((n, nodes.block_size, nodes.block_size))
         blocks[:, :d, :d] = stiffness[:, None, None] * outer(nodes.normal, nodes.normal)

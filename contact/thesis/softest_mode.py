@@ -80,7 +80,8 @@ def softest_mode(problem: ContactProblem, operator: Operator, state: State, shif
     law, jump = interface.foundation, nodes.jump(state.x)
     blocks, graph = augmentation(nodes, shift, False), law.normal_graph(jump)
     if graph is not None:
-        layer = graph.layer_slope(graph.rho_0)
+        # Nodes that face nothing touch no layer.
+        layer = graph.layer_slope(np.where(np.isfinite(graph.rho_0), graph.rho_0, 0.0))
         blocks += layer[:, None, None] * augmentation(nodes, 1.0, False)
     blocks += law.charge_block(jump, interface.pressure(jump, state.forces))
     weighted = interface.weighted(blocks, state.x)

@@ -10,7 +10,7 @@ from contact import parse_case, solve
 from contact.body.description import Body
 from contact.errors import InputError, SingularError
 from contact.linear.operator import SparseOperator
-from contact.methods.options import PenaltyOptions
+from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
@@ -19,7 +19,9 @@ from contact.model.obstacle import GapFunction
 from contact.problem.checks import check_rigid_modes
 from contact.problem.problem import ContactProblem
 from contact.results.contact_nodes import contact_table
+from contact.thesis.fixed_point import FixedPoint
 from contact.thesis.penalty import Penalty
+from contact.thesis.softest_mode import softest_mode
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks
@@ -97,6 +99,40 @@ def test_penalties_find_what_friction_alone_holds(degree, gap):
     problem = pushed(MPI.COMM_SELF, degree, gap=gap)
     exact, near = state_of(problem, 1e-11).x, solved_by(problem, PenaltyOptions()).state.x
     assert np.abs(near - exact).max() < 0.02 * np.abs(exact).max()
+
+
+def half_facing(**layer):
+    """Return a held block that faces another one with half of its side, at a distance."""
+    gap = GapFunction(lambda points: np.where(points[:, 0] < 0.6, 0.01, np.inf))
+    moduli = {"upper": 1.0, "lower": 3.0}
+    body = Body(
+        [Material(Linear(young, 0.3), on=(name,)) for name, young in moduli.items()],
+        [Fixed("bottom", [ZERO] * 2), Fixed("upper_left", [ZERO, None])],
+        [Load("top", [ZERO, constant(-0.01, 2)])],
+    )
+    contact = Contact("under", gap, against="over", **layer)
+    return ContactProblem(Blocks(2, 6, 9).domain(MPI.COMM_SELF), body, contact)
+
+
+@pytest.mark.parametrize("layer", [{}, {"law": "compliance", "layer": 0.005, "stiffness": 1.0}])
+def test_penalties_where_nodes_face_nothing(layer):
+    """Their gap is infinite: the first increment was no number."""
+    problem = half_facing(**layer)
+    assert 0 < np.isinf(problem.nodes.gap).sum() < problem.nodes.size
+    exact, near = state_of(problem, 1e-11).x, solved_by(problem, PenaltyOptions()).state.x
+    assert np.abs(near - exact).max() < 0.02 * np.abs(exact).max()
+
+
+def test_nodes_that_face_nothing_touch_no_layer():
+    """At its first touch a layer has the same stiffness, whether it saturates or not."""
+    found = []
+    for limit in (0.1, np.inf):
+        problem = half_facing(law="compliance", layer=0.005, stiffness=1.0, limit=limit)
+        operator = FixedPoint(problem, FixedPointOptions()).operator
+        shift = 1e-12 * problem.scales.c
+        found.append(softest_mode(problem, operator, problem.start(), shift))
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+    assert found[0] < 0.5, "it holds half of the side"
 
 
 def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
