@@ -52,7 +52,7 @@ class Regularisation:
 
 
 def outer(a: Array, b: Array) -> Array:
-    """Return a b^T node by node, shape (n, d, d)."""
+    """Return a b^T node by node, shape (n, d, k)."""
     return a[:, :, None] * b[:, None, :]
 
 
@@ -101,20 +101,25 @@ class PenalisedLaw:
         return Multipliers(self._pressed(jump)[0].contact, modulus[:, None] * tangential)
 
     def block(self, jump: Array) -> Array:
-        """Return their derivative, shape (n, d, d). Collective."""
+        """Return their derivative by the jumps, shape (n, d, block size). Collective."""
         interface, nodes = self._interface, self._interface.nodes
         multipliers, slope = self._pressed(jump)
         modulus = self._modulus_at(jump) if self._modulus is None else self._modulus
-        block = slope[:, None, None] * outer(nodes.normal, nodes.normal)
-        block = block + modulus[:, None, None] * nodes.tangent
+        block = np.zeros((*nodes.normal.shape, nodes.block_size))
+        in_space = block[:, :, : nodes.dim]
+        in_space += slope[:, None, None] * outer(nodes.normal, nodes.normal)
+        in_space += modulus[:, None, None] * nodes.tangent
         if self._modulus is not None:
             return block
         slip, unit = interface.slip_length(jump), unit_vectors(interface.slip(jump))
         total, share = interface.pressure(jump, multipliers), slip / (slip + self._eps.slip)
         along = (interface.friction.by_slip(total, slip) - modulus) * share
-        across = interface.friction.by_pressure(total, slip) * slope * share
-        block = block + along[:, None, None] * outer(unit, unit)
-        return block + across[:, None, None] * outer(unit, nodes.normal)
+        across = interface.friction.by_pressure(total, slip) * share
+        in_space += along[:, None, None] * outer(unit, unit)
+        # The layer's pressure bounds friction too, and grows with the potential.
+        growth = interface.foundation.layer_gradient(jump)
+        growth[:, : nodes.dim] += slope[:, None] * nodes.normal
+        return block + across[:, None, None] * outer(unit, growth)
 
 
 logger = logging.getLogger("contact.inner")
@@ -268,7 +273,7 @@ class PenalisedProblem:
         n, d = nodes.normal.shape
         blocks = np.zeros((n, nodes.block_size, nodes.block_size))
         blocks[:, :d, :d] = stiffness[:, None, None] * outer(nodes.normal, nodes.normal)
-        blocks[:, :d, :d] += self._law.block(jump)
+        blocks[:, :d] += self._law.block(jump)
         self.operator.update("secant", state, interface.weighted(blocks, state.x))
         rhs = body.external(state.time) - body.internal_forces(state)
         nodes.add_jump_transposed(
@@ -305,7 +310,7 @@ class PenalisedProblem:
         body, nodes, x = self._body, self._interface.nodes, self._unknowns(iterate)
         jump, d = nodes.jump(x), body.dim
         blocks = self._current_block.copy()
-        blocks[:, :d, :d] += self._law.block(jump)
+        blocks[:, :d] += self._law.block(jump)
         if self._layer is not None:
             u_n = nodes.normal_component(jump)
             slope = np.where(u_n < self._interface.gap, self._layer.layer_slope(u_n), 0.0)

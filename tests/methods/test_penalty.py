@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from contact import solve
 from contact.body.description import Body
+from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.mesh import grid as domain
@@ -185,6 +186,56 @@ def test_blocks_are_the_derivative_of_the_forces(law, dim):
     numerical = (forces(step) - forces(-step)) / (2 * step)
     exact = np.einsum("nij,nj->ni", model.block(x), d)
     assert np.allclose(numerical, exact, rtol=1e-6, atol=1e-7)
+
+
+LAYER = {"law": "compliance", "stiffness": 1.0, "limit": np.inf}
+
+
+@pytest.mark.parametrize(
+    "layer",
+    [
+        {},
+        {**LAYER, "layer": 0.1},
+        {**LAYER, "layer": np.inf},
+        {**LAYER, "layer": 0.1, "lagged": True},
+    ],
+    ids=["rigid", "layer", "no rigid part", "lagged"],
+)
+def test_the_tangent_is_the_derivative_of_the_residual(layer):
+    square = domain.rectangle(MPI.COMM_SELF, [0, 0], [1, 1], [3, 3])
+    load = Load("left", [Expression(0.02), Expression(0.01)])
+    body = Body(Linear(1.0, 0.3), [Fixed("top", [ZERO] * 2)], [load])
+    contact = Contact("bottom", GapFunction(lambda x: np.full(len(x), 0.05)), **layer)
+    problem = ContactProblem(square, body, contact, Friction(SlipCoefficient(0.5, 0.2, 10.0)))
+    options = PenaltyOptions(eps_contact=0.3, eps_slip=0.2, material_step="tangent")
+    penalty = Penalty(problem, options)
+    penalty.solve(problem.start())
+    snes = penalty._solvers[False].snes
+    x, way, exact, before, after = (snes.getSolution().duplicate() for _ in range(5))
+    free = problem.body.free.ravel()[: x.size]
+    x.array[:], way.array[:] = 0.1 * free * np.random.default_rng(1).normal(size=(2, x.size))
+    tangent, step = snes.getJacobian()[0], 1e-6
+    snes.computeJacobian(x, tangent)
+    tangent.mult(way, exact)
+    snes.computeFunction(x - step * way, before)
+    snes.computeFunction(x + step * way, after)
+    error = (after - before).array / (2 * step) - exact.array
+    assert np.abs(error).max() < 1e-6 * np.abs(exact.array).max()
+
+
+def test_friction_by_the_potential_is_that_of_the_pressure_of_the_layer():
+    case = steel()
+    case["mesh"]["cells"] = [4, 1]
+    piezo = {"e31": -0.5, "e33": 1.0, "e15": 0.7, "beta11": 1.0, "beta33": 1.0}
+    case["material"] = {"young": 1.0, "poisson": 0.3, "piezo": piezo}
+    case["fixed"][0]["potential"] = 0.0
+    case["contact"] |= {**LAYER, "layer": 0.3, "potential_range": 10.0}
+    problem = build_problem(parse_case(case), MPI.COMM_SELF)
+    x, d = 0.1 * np.random.default_rng(1).normal(size=(2, problem.nodes.size, 3))
+    model, step = PenalisedLaw(problem.interface, Regularisation(0.3, 0.2)), 1e-6
+    before, after = (model.forces(x + t * d).vectors(problem.nodes) for t in (-step, step))
+    exact = np.einsum("nij,nj->ni", model.block(x), d)
+    assert np.allclose((after - before) / (2 * step), exact, rtol=1e-6, atol=1e-9)
 
 
 def block(fixed, gap: float, force: float = -0.1):
