@@ -120,6 +120,16 @@ class Extremes(NamedTuple):
     plastic: float | None  #: equivalent plastic strain; None for a law without
 
 
+def strain_across(body: BodyEquilibrium, material: Material, eps: Expr, phi: Expr | None) -> Expr:
+    """Return eps_zz of plane stress at the last fit of the laws, which no form sees, as tensor."""
+    across: Expr | float = 0.0
+    if isinstance(material.law, PlaneStressElastic):
+        across = material.law.strain_across(eps, ufl.grad(phi) if material.piezo else None)
+    elif isinstance(material.law, PlaneStressHistory):
+        across = body.laws.fits[ACROSS]
+    return across * ufl.as_tensor(np.diag([0.0, 0.0, 1.0]).tolist())
+
+
 def fields_of(body: BodyEquilibrium, material: Material, at: fem.Function) -> dict[str, Any]:
     """Return the fields of a material at some unknowns in UFL, None for those that it has not."""
     u, phi = body.split(at)
@@ -127,16 +137,11 @@ def fields_of(body: BodyEquilibrium, material: Material, at: fem.Function) -> di
     # The nodes may lie on the axis.
     eps = strain(u, kinematics_of(body.domain, body.element, on_axis=True))
     law = body.laws.fitted_law(form_law(material, body.domain.mesh))
-    sigma, across = stress(law, eps), None
+    sigma = stress(law, eps)
     piezo = material.piezo and piezo_with_constants(material.piezo, body.domain.mesh)
     if piezo is not None:
         sigma += coupling_stress(piezo, phi)
-    if isinstance(material.law, PlaneStressElastic):
-        across = material.law.strain_across(eps, None if piezo is None else ufl.grad(phi))
-    elif isinstance(material.law, PlaneStressHistory):
-        across = body.laws.fits[ACROSS]
-    if across is not None:  # no form sees it
-        eps = eps + across * ufl.as_tensor(np.diag([0.0, 0.0, 1.0]).tolist())
+    eps = eps + strain_across(body, material, eps, phi)
     electric = field = None if phi is None else ufl.as_vector([0.0] * body.dim)
     if piezo is not None:
         charge, gradient = electric_displacement(piezo, eps, phi), ufl.grad(phi)
@@ -364,25 +369,29 @@ class Deformation(NamedTuple):
     largest_volume: float  #: the same
 
 
-def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
-    """Return the extremes of strain and volume at local unknowns of a body. Collective."""
+def deformation(body: BodyEquilibrium, state: LinearisationPoint) -> Deformation:
+    """Return the extremes of strain and volume at a state of a body. Collective."""
     mesh, kinematics = body.domain.mesh, body.domain.kinematics
-    nodal, middle = body.nodal(x).ravel(), shape_of(mesh).middle
+    nodal, middle = body.nodal(state.x).ravel(), shape_of(mesh).middle
+    body.laws.fit(state)
     if body.cuts is not None:
-        body.cuts.set(body.cuts.jump, body.motion(x))
+        body.cuts.set(body.cuts.jump, body.motion(state.x))
 
-    def measures(at: fem.Function) -> Expr:
-        u, _ = body.split(at)
+    def measures(material: Material, at: fem.Function) -> Expr:
+        u, phi = body.split(at)
         u = u if body.cuts is None else u + body.cuts.jump
         eps, stretch = strain(u, kinematics), ufl.Identity(3) + kinematics.gradient(u)
-        return ufl.as_vector([ufl.sqrt(ufl.inner(eps, eps)), ufl.det(stretch)])
+        across = strain_across(body, material, eps, phi)
+        size = ufl.sqrt(ufl.inner(eps + across, eps + across))
+        return ufl.as_vector([size, ufl.det(stretch + across)])
 
-    cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
     extremes = np.array([0.0, -np.inf, -np.inf])
-    for _, found in body.pointwise.values("deformation", measures, middle, nodal, cells):
-        size, volume = found[:, 0].T
-        here = [size.max(initial=0.0), (-volume).max(initial=-np.inf), volume.max(initial=-np.inf)]
-        extremes = np.maximum(extremes, here)
+    for k, (material, cells) in enumerate(zip(body.description.materials, body.cells, strict=True)):
+        name, expression = ("deformation", k), partial(measures, material)
+        for _, found in body.pointwise.values(name, expression, middle, nodal, cells):
+            size, volume = found[:, 0].T
+            here = [size.max(initial=0.0), (-volume).max(initial=-np.inf)]
+            extremes = np.maximum(extremes, [*here, volume.max(initial=-np.inf)])
     body.comm.Allreduce(MPI.IN_PLACE, extremes, op=MPI.MAX)
     return Deformation(float(extremes[0]), float(-extremes[1]), float(extremes[2]))
 

@@ -104,7 +104,7 @@ def evaluate_extremes(solution: Solution, whole: bool = True) -> list[float]:
         solution.equivalent_plastic_strain = max(largest.plastic or 0.0 for largest in plastic)
         solution.plastic_volume = sum(largest.yielded or 0.0 for largest in plastic)
     if whole:
-        solution.deformation = deformation(body, solution.state.x)
+        solution.deformation = deformation(body, solution.state)
         if not solution.converged:
             solution.error = None  # it estimates the distance of the mesh's solution alone
         elif solution.error is None:

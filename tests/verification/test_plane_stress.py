@@ -82,6 +82,15 @@ def test_a_strip_is_a_bar(name, degree):
     assert np.allclose(strain[:, 2, 2], across, rtol=1e-7, atol=0)
     assert np.allclose(stress[:, 0, 0], 1.2, rtol=1e-8, atol=0)
     assert np.abs(stress[:, [1, 2], [1, 2]]).max(initial=0.0) < 1e-8
+    made, volume = solution.deformation, (1 + along) * (1 + across) ** 2
+    assert made.largest_strain == pytest.approx(np.hypot(along, np.sqrt(2) * across), rel=1e-8)
+    assert [made.least_volume, made.largest_volume] == pytest.approx([volume] * 2, rel=1e-9)
+
+
+def test_the_strain_across_counts_among_large_strains():
+    """In the plane |eps| is 0.098, and 0.102 with that across."""
+    solution = solve(strip(LAWS["linear"], pull=0.094 * YOUNG))
+    assert any("[small-strain]" in text for text in solution.warnings)
 
 
 @pytest.mark.core
