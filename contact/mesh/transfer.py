@@ -22,7 +22,7 @@ from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import deviations
 from contact.mesh.domain import Domain, exterior_facets
-from contact.mesh.entities import Indices, cell_facets, cells_at, sums_at
+from contact.mesh.entities import Indices, cell_facets, cells_at, extent, sums_at
 from contact.mesh.geometry import determinant, jacobians, unit_normals
 from contact.mesh.owners import Owners
 from contact.typing import Array
@@ -157,10 +157,9 @@ def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
     comm = lasting(mesh.comm)
     everywhere = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
     largest = float(mesh.h(mesh.topology.dim, everywhere).max(initial=0.0))
-    extent = float(np.ptp(space.mesh.geometry.x, axis=0).max(initial=0.0))
-    largest, extent = (comm.allreduce(size, op=MPI.MAX) for size in (largest, extent))
+    largest = comm.allreduce(largest, op=MPI.MAX)
     # A larger padding makes dolfinx search more cells.
-    padding = min(OUTSIDE * extent, NEAR * largest)
+    padding = min(OUTSIDE * extent(space.mesh), NEAR * largest)
     data = fem.create_interpolation_data(space, source, cells, padding=padding)
     made.interpolate_nonmatching(coarse, cells, interpolation_data=data)
     made.x.scatter_forward()

@@ -27,6 +27,7 @@ from contact.model.obstacle import (
     Sphere,
     Triangles,
 )
+from contact.model.obstacle.shapes import measured
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.mechanics import constant
@@ -188,8 +189,9 @@ def test_a_ray_passes_by_no_side_of_a_body_that_is_not_convex():
 @pytest.mark.parametrize("name", SHAPES)
 def test_normals_are_the_slope_of_the_distance(name):
     """Also beside edges and tips, where there are several slopes."""
-    SHAPES[name][0].check_normals(POINTS)
-    SHAPES[name][0].check_normals(1e-3 * POINTS + np.array(TIP))
+    for points in (POINTS, 1e-3 * POINTS + np.array(TIP)):
+        turned, known, _ = SHAPES[name][0].turned_normals(points)
+        assert 2 * turned <= known
 
 
 class Turned(Plane):
@@ -201,16 +203,33 @@ class Turned(Plane):
         return distance, -normal
 
 
-@pytest.mark.parametrize("count", [0, 1, 30])
-def test_a_wrong_sign_of_normals_is_refused(count):
-    points = 5.0 + POINTS[:count, :2]
-    Plane((0.0, 0.0), (1.0, 2.0)).check_normals(points)
-    turned = Turned((0.0, 0.0), (1.0, 2.0))
-    if count == 0:  # of a rank without contact nodes
-        turned.check_normals(points)
-        return
-    with pytest.raises(InputError, match=r"\[shape-normals\]"):
-        turned.check_normals(points)
+@pytest.mark.parallel
+def test_a_wrong_sign_of_normals_is_refused():
+    """All ranks decide by the points of all: a rank may have none, or a single one."""
+    comm, up = MPI.COMM_WORLD, (1.0, 2.0)
+    for count in (1, 30):
+        points = 5.0 + POINTS[: count if comm.rank == comm.size - 1 else 0, :2]
+        normal = np.zeros_like(points)
+        measured(Plane((0.0, 0.0), up), points, normal, comm, "contact")
+        with pytest.raises(InputError, match=r"contact.foundation: .*\[shape-normals\]"):
+            measured(Turned((0.0, 0.0), up), points, normal, comm, "contact")
+
+
+class AtAnEdge(Plane):
+    """A plane whose normal is wrong at the points of one rank."""
+
+    def distance(self, points):
+        """Return distances and normals."""
+        distance, normal = super().distance(points)
+        return distance, np.where(points[:, :1] > 100, -normal, normal)
+
+
+@pytest.mark.parallel
+def test_points_of_a_single_rank_do_not_decide():
+    comm = MPI.COMM_WORLD
+    points = np.full((1 if comm.rank == 0 else 5, 2), 200.0 if comm.rank == 0 else 5.0)
+    if comm.size > 1:
+        measured(AtAnEdge((0.0, 0.0), (1.0, 2.0)), points, 0 * points, comm, "contact")
 
 
 def test_shapes_by_formulas_and_files_are_those_of_functions_and_arrays(tmp_path):

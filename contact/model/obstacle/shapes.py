@@ -101,11 +101,11 @@ class Shape(ABC):
             expect(f"{name}: {key}", given, "a direction, not 0", not direction or vector.any())
 
     @np.errstate(all="ignore")
-    def check_normals(self, points: Array) -> None:
-        """Refuse normals against the slope of the distance, its difference quotient.
+    def turned_normals(self, points: Array) -> tuple[int, int, str]:
+        """Return at how many of some points normals are against the slope, of how many, and one.
 
-        It is taken at some of the points from which the shape is seen, shape (n, d); at single ones
-        it may be off, at edges or where the distance is an approximation: most of them decide.
+        The slope is the difference quotient of the distance, at some of the points from which the
+        shape is seen, shape (n, d).
         """
         x = points[:: len(points) // CHECKED + 1]
         distance, normal = self.distance(x)
@@ -118,17 +118,14 @@ class Shape(ABC):
         slope = (ahead - behind) / (2 * h)
         along = np.einsum("nd,nd->n", normal, slope)
         turned = np.flatnonzero(along < 0)
-        if 2 * turned.size > np.count_nonzero(np.isfinite(along)):
+        words = ""
+        if turned.size > 0:
             given, there, place = (
                 f"({', '.join(f'{a:.4g}' for a in np.round(vector, 9) + 0.0)})"
                 for vector in (normal[turned[0]], slope[turned[0]], x[turned[0]])
             )
-            raise InputError(
-                f"{type(self).__name__}: distance: the normal {given} at {place}, where "
-                f"differences of the distances are {there}; accepted: unit normals out of the "
-                "foundation, the slope of the signed distance",
-                "shape-normals",
-            )
+            words = f"the normal {given} at {place}, where differences of the distances are {there}"
+        return turned.size, np.count_nonzero(np.isfinite(along)), words
 
     @abstractmethod
     def distance(self, points: Array) -> tuple[Array, Array]:
@@ -246,11 +243,18 @@ def measured(
                 # NaN is refused by those who know whether the value is needed.
                 accepted = "a direction and a gap for each of the points"
                 found = real(direction, points.shape, accepted), real(gap, gap_shape, accepted)
-                if shape is not None:
-                    shape.check_normals(points)
+                votes = (0, 0, "") if shape is None else shape.turned_normals(points)
         except InputError as error:
             own = error.words.startswith(label)
             raise error.within("" if own else f"{label}: ") from error.__cause__
+    # At single points, at edges or where the distance is an approximation, the slope may be off.
+    turned, known, words = zip(*comm.allgather(votes), strict=True)
+    if 2 * sum(turned) > sum(known):
+        raise InputError(
+            f"{label}: {type(obstacle).__name__}: distance: {next(filter(None, words))}; accepted: "
+            "unit normals out of the foundation, the slope of the signed distance",
+            "shape-normals",
+        )
     return found
 
 
