@@ -465,7 +465,9 @@ _RUN = (
         lambda r: ", ".join(dict.fromkeys(c.foundation.direction for c in r.problem.contacts)),
     ),
     Quantity(
-        "work", "work", "Of loads, supports, electrodes, layer and charge in the step.",
+        "work", "work",
+        "Of loads, supports, electrodes, layer and charge in the step; that of pressures on an "
+        "interference is not counted.",
         lambda r: r.energies.work, (STEPS,),
     ),
     Quantity(
