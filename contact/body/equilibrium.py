@@ -50,7 +50,7 @@ from contact.mesh.entities import (
     graph_components,
     with_ghosts,
 )
-from contact.mesh.geometry import areas, volumes
+from contact.mesh.geometry import areas, geometry_nodes, volumes
 from contact.ranks import summed
 from contact.tolerances import MOST_ROUNDING, NEGLIGIBLE, TOUCHING
 from contact.typing import Array
@@ -245,17 +245,32 @@ class BodyEquilibrium:
         return self.layout.free
 
     @cached_property
-    def extents(self) -> Array:
-        """Largest extents of the connected components, shape (k,) (length). Collective."""
-        component, count = self.components
-        if count == 1:
-            return np.array([self.domain.size])
-        low = np.full((count, self.dim), np.inf)
+    def component_of_cells(self) -> NDArray[np.intp]:
+        """Connected component of each local cell, shape (cells,). Collective."""
+        index_map, (component, _) = self.space.dofmap.index_map, self.components
+        of_nodes = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.intp)
+        of_nodes[: component.size] = component
+        return np.asarray(with_ghosts(index_map, of_nodes)[self.space.dofmap.list[:, 0]])
+
+    @cached_property
+    def boxes(self) -> tuple[Array, Array]:
+        """Lower and upper corners of the connected components, shapes (k, d). Collective."""
+        of_cells = geometry_nodes(self.domain)
+        of_nodes = np.repeat(self.component_of_cells[: len(of_cells)], of_cells.shape[1])
+        low = np.full((self.components[1], self.dim), np.inf)
         high = -low
-        np.minimum.at(low, component, self.layout.points)
-        np.maximum.at(high, component, self.layout.points)
+        np.minimum.at(low, of_nodes, of_cells.reshape(-1, self.dim))
+        np.maximum.at(high, of_nodes, of_cells.reshape(-1, self.dim))
         self.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
         self.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+        return low, high
+
+    @property
+    def extents(self) -> Array:
+        """Largest extents of the connected components, shape (k,) (length). Collective."""
+        if self.components[1] == 1:
+            return np.array([self.domain.size])
+        low, high = self.boxes
         return np.asarray((high - low).max(axis=1))
 
     @cached_property
@@ -264,15 +279,11 @@ class BodyEquilibrium:
 
         The thickness of a component is twice its volume over its boundary's area.
         """
-        domain, (component, count) = self.domain, self.components
-        dofmap, facets = self.space.dofmap, exterior_facets(self.domain.mesh)
-        of_nodes = np.zeros(dofmap.index_map.size_local + dofmap.index_map.num_ghosts, dtype=int)
-        of_nodes[: component.size] = component
-        of_cells = with_ghosts(dofmap.index_map, of_nodes)[dofmap.list[:, 0]]
-        volume = volumes(domain)
-        boundary = of_cells[cells_at(domain.mesh, facets)[0]]
+        domain, of_cells, count = self.domain, self.component_of_cells, self.components[1]
+        volume, facets = volumes(domain), exterior_facets(domain.mesh)
+        behind = of_cells[cells_at(domain.mesh, facets)[0]]
         thickness = 2 * component_sums(self.comm, of_cells[: volume.size], volume, count)
-        thickness /= component_sums(self.comm, boundary, areas(domain, facets), count)
+        thickness /= component_sums(self.comm, behind, areas(domain, facets), count)
         return np.maximum(TOUCHING * thickness, NEGLIGIBLE * domain.size)
 
     def components_of(self, *parts: str) -> NDArray[np.bool_]:

@@ -23,9 +23,8 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.mortar.search import in_balls, meeting, nearest, within
 from contact.interface.mortar.surface import Surface, straight_surface, surface_of
 from contact.mesh.cells import shape_of
-from contact.mesh.entities import exterior_facets
+from contact.mesh.entities import cells_at, exterior_facets
 from contact.mesh.geometry import geometry_nodes, nearest_on_simplices, pulled_back
-from contact.mesh.owners import Owners
 from contact.ranks import bounding_boxes, exchanged
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
@@ -105,7 +104,7 @@ class _Boundaries:
             radius = surface.corners[:, :, 0].max(axis=1, initial=0.0)
             facets = facets[radius > NEGLIGIBLE * domain.size]
             surface = straight_surface(domain, body.space, facets)
-        component = _components(body, surface.owners, surface.nodes[:, 0])
+        component = body.component_of_cells[cells_at(domain.mesh, facets)[0]]
         sides = np.zeros((facets.size, len(parts), 2), dtype=bool)
         bodies = np.zeros((len(parts), 2, count), dtype=bool)
         for pair, both in enumerate(parts):
@@ -145,39 +144,21 @@ class _Boundaries:
         x = surface.shape.lagrange(surface.order, places) @ surface.points
         return x.reshape(-1, d), np.repeat(self.component, len(places))
 
-    @cached_property
-    def boxes(self) -> tuple[Array, Array]:
-        """Lower and upper corners of the boxes of bodies, shapes (components, d). Collective."""
-        x, of = self.points
-        low = np.full((self.body.components[1], x.shape[1]), np.inf)
-        high = -low
-        np.minimum.at(low, of, x)
-        np.maximum.at(high, of, x)
-        self.body.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
-        self.body.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
-        return low, high
-
-    @cached_property
-    def of_cells(self) -> Numbers:
-        """The components of the owned cells. Collective."""
-        dofmap = self.body.space.dofmap
-        first = dofmap.list[: self.body.domain.mesh.topology.index_map(self.body.dim).size_local, 0]
-        named = dofmap.index_map.local_to_global(first.copy()).astype(np.int64)
-        return _components(self.body, self.surface.owners, named)
-
     def twins(self) -> tuple[Numbers, Numbers, Array]:
         """Return bodies that coincide, the other ones, and the depths of both. Collective."""
         # No point of the boundary of either is within the other, but any other point is.
-        low, high = self.boxes
+        low, high = self.body.boxes
         off = np.maximum(*(np.abs(x[:, None] - x).max(axis=2) for x in (low, high)))
         rounding = self.body.rounding
         alike = np.count_nonzero(off <= np.minimum.outer(rounding, rounding), axis=1) > 1
         if not alike.any():
             none = np.zeros(0, dtype=np.intp)
             return none, none, np.zeros(0)
-        cells = np.flatnonzero(alike[self.of_cells])
-        comm, of, far = self.body.comm, self.of_cells[cells], ASIDE * self.body.domain.size
-        x = geometry_nodes(self.body.domain)[cells].mean(axis=1)
+        x = geometry_nodes(self.body.domain).mean(axis=1)
+        of_cells = self.body.component_of_cells[: len(x)]
+        cells = np.flatnonzero(alike[of_cells])
+        comm, far = self.body.comm, ASIDE * self.body.domain.size
+        x, of = x[cells], of_cells[cells]
         boundary, own = self.points
         depth = nearest(
             comm, np.column_stack([x, far * of]), np.column_stack([boundary, far * own])
@@ -209,7 +190,7 @@ class _Boundaries:
             found = geometry.compute_collisions_points(tree, padded)
             point = np.repeat(np.arange(len(there)), np.diff(found.offsets))
             cell = found.array.astype(np.intp)
-        component = self.of_cells
+        component = self.body.component_of_cells
         apart = component[cell] != of[point]
         point, cell = point[apart], cell[apart]
         of_cells = shape_of(mesh)
@@ -230,7 +211,7 @@ class _Boundaries:
     def _near(self, x: Array, of: Numbers) -> NDArray[np.bool_]:
         """Return which points of bodies are in boxes of other ones. Collective."""
         rounding, near = self.body.rounding, np.zeros(len(x), dtype=bool)
-        for body, (low, high) in enumerate(zip(*self.boxes, strict=True)):
+        for body, (low, high) in enumerate(zip(*self.body.boxes, strict=True)):
             touching = np.minimum(rounding[of], rounding[body])[:, None]
             held = np.all((x > low + touching) & (x < high - touching), axis=1)
             near |= held & (of != body)
@@ -291,12 +272,6 @@ class _Boundaries:
             curved.unknown[there] = alone.unknown[row]
             curved.change[there] = alone.change[row]
         return curved
-
-
-def _components(body: BodyEquilibrium, owners: Owners, nodes: NDArray[np.int64]) -> Numbers:
-    """Return the connected components of nodes by global numbers. Collective."""
-    piece, _ = body.components
-    return owners.values(nodes, lambda given: piece[given - owners.begin].astype(np.intp))
 
 
 def _from_facets(facets: Surface, of: Numbers, x: Array) -> tuple[Array, Array]:
