@@ -15,8 +15,12 @@ ROUNDING = 500 * EPS
 #: more, and rigid-body modes from an orthogonal basis an error of about a root of `EPS`.
 NEGLIGIBLE = 1e-9
 
-#: Overlap of two bodies, over the thickness of the thinner one, that counts as rounding.
+#: Overlap of two bodies, over the thickness of the thinner one, that changes nothing.
 TOUCHING = 1e-6
+
+#: Overlap of two bodies, over the largest coordinate, that may be the rounding of positions in
+#: files: of both bodies, in single precision or with seven digits.
+POSITIONS = 2e-7
 
 #: The least tolerance of relative residuals: the size of their rounding errors.
 PRECISION = 1e-15

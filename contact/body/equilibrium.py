@@ -52,7 +52,7 @@ from contact.mesh.entities import (
 )
 from contact.mesh.geometry import areas, geometry_nodes, volumes
 from contact.ranks import summed
-from contact.tolerances import MOST_ROUNDING, NEGLIGIBLE, TOUCHING
+from contact.tolerances import MOST_ROUNDING, POSITIONS, TOUCHING
 from contact.typing import Array
 
 
@@ -274,8 +274,8 @@ class BodyEquilibrium:
         return np.asarray((high - low).max(axis=1))
 
     @cached_property
-    def rounding(self) -> Array:
-        """Overlaps with connected components that are rounding, (k,) (length). Collective.
+    def negligible_overlaps(self) -> Array:
+        """Overlaps with connected components that change nothing, (k,) (length). Collective.
 
         The thickness of a component is twice its volume over its boundary's area.
         """
@@ -284,7 +284,18 @@ class BodyEquilibrium:
         behind = of_cells[cells_at(domain.mesh, facets)[0]]
         thickness = 2 * component_sums(self.comm, of_cells[: volume.size], volume, count)
         thickness /= component_sums(self.comm, behind, areas(domain, facets), count)
-        return np.maximum(TOUCHING * thickness, NEGLIGIBLE * domain.size)
+        return np.asarray(TOUCHING * thickness)
+
+    @cached_property
+    def position_rounding(self) -> float:
+        """Overlap that may be the rounding of positions in files (length). Collective."""
+        largest = float(np.abs(self.domain.mesh.geometry.x).max(initial=0.0))
+        return POSITIONS * self.comm.allreduce(largest, op=MPI.MAX)
+
+    def accepted_overlaps(self, one: NDArray[np.intp], other: NDArray[np.intp]) -> Array:
+        """Return overlaps of components that count as none, shape (n,) (length). Collective."""
+        least = np.minimum(self.negligible_overlaps[one], self.negligible_overlaps[other])
+        return np.maximum(least, self.position_rounding)
 
     def components_of(self, *parts: str) -> NDArray[np.bool_]:
         """Return which connected components have facets of boundary parts, (k,). Collective."""

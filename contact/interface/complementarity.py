@@ -62,27 +62,27 @@ def interface_residuals(
 ) -> tuple[Array, Array]:
     """Return the contact and friction residuals (16) and their floors, (2,). Collective.
 
-    The `worst` of the connected components, each relative to max(|p|, 1e-4 c_0 |g|) with
+    The `worst` of the connected components, each relative to max(|p|, 1e-4 E/L |g|) with
     p = -sigma_nu, norms in L2(Gamma_3): g is |g_N|, at most the displacement of the node and the
     size. `rounding` is that of the pressures of each component, in L2(Gamma_3).
     """
     c_r, normal_gap = interface.c_r, interface.normal_gap(jump)
     contact = multipliers.contact - project_half_line(multipliers.contact - c_r * normal_gap)
     # Friction along the normal violates the law wherever a node sticks or slips.
-    trial = interface.nodes.tangential_component(multipliers.friction) + c_r * interface.slip(jump)
+    trial = interface.nodes.tangential_component(multipliers.friction)
+    trial += c_r[:, None] * interface.slip(jump)
     friction = multipliers.friction - project_disc(trial, bound)
     friction[np.isnan(bound)] = np.nan  # no comparison with NaN is true
-    # The scale is max(|p|, 1e-4 c_0 |g|), with gaps g of at most the motion of their nodes.
+    # The scale is max(|p|, 1e-4 E/L |g|), with gaps g of at most the motion of their nodes.
     before = np.linalg.norm(interface.friction.history.jump, axis=1)
     now = np.linalg.norm(jump[:, : interface.dim], axis=1)
     motion = np.maximum(now, before)
-    gap_stress = interface.c_0 * interface.norms(
-        np.minimum(np.minimum(np.abs(normal_gap), motion), interface.size)
-    )
+    gap = np.minimum(np.minimum(np.abs(normal_gap), motion), interface.size)
+    gap_stress = interface.norms(interface.stiffness * gap)
     total = interface.norms(interface.pressure(jump, multipliers))
     # Without pressure nodes may just touch: their gaps are rounding too.
     rounding_stress = interface.norms(np.full_like(motion, interface.rounding_pressure(jump)))
-    motion_stress = interface.c_0 * interface.norms(np.minimum(now, interface.size))
+    motion_stress = interface.norms(interface.stiffness * np.minimum(now, interface.size))
     gap_stress = np.where(
         total <= rounding_stress, np.maximum(gap_stress, motion_stress), gap_stress
     )

@@ -61,8 +61,10 @@ class Interface:
     fixed_conducting
         The charge at nodes without a free displacement, but with a free potential, or None.
     c_0
-        Reference stiffness c_0 = E/L (stress/length), E behind Gamma_3, L the extent of the
-        smallest body there: the complementarity parameter of the active set of a solution.
+        Reference stiffness c_0 = E/size (stress/length), E behind Gamma_3: the complementarity
+        parameter of the active set of a solution.
+    stiffness
+        E/L, L the extent of the smaller body of the contact, shape (n,) (stress/length).
     size
         Largest extent of the body (length).
     elongation
@@ -80,6 +82,7 @@ class Interface:
     friction: NodalFriction
     fixed_conducting: FoundationLaw | None
     c_0: float
+    stiffness: Array
     size: float
     elongation: float
     component: NDArray[np.intp]
@@ -87,13 +90,13 @@ class Interface:
     proximal: Proximal | None = None
 
     @property
-    def c_r(self) -> float:
-        """Complementarity parameter c_r = elongation c_0 of the residuals (16) (stress/length).
+    def c_r(self) -> Array:
+        """Complementarity parameter c_r of the residuals (16), shape (n,) (stress/length).
 
-        Behind facets that are short beside the depth of their cells a gap takes a stress far above
-        c_0 times it: errors of the pressure would be hidden.
+        It is elongation times `stiffness`: behind facets that are short beside the depth of their
+        cells a gap takes a stress far above that, and errors of the pressure would be hidden.
         """
-        return self.elongation * self.c_0
+        return self.elongation * self.stiffness
 
     @property
     def comm(self) -> MPI.Intracomm:

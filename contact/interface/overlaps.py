@@ -62,7 +62,7 @@ def overlap_depths(
     twins = bodies.twins()
     own, other, depth = (np.append(a, b) for a, b in zip((own, other, depth), twins, strict=True))
     on_sides = np.pad(on_sides, ((0, len(own) - len(on_sides)), (0, 0)))
-    depth[depth <= np.minimum(body.rounding[own], body.rounding[other])] = 0.0
+    depth[depth <= body.accepted_overlaps(own, other)] = 0.0
     between = bodies.between(own, other)
     press = np.array([press for *_, press in pairs], dtype=bool)
     elsewhere = (on_sides & press).any(axis=1, keepdims=True) & ~press
@@ -149,8 +149,8 @@ class _Boundaries:
         # No point of the boundary of either is within the other, but any other point is.
         low, high = self.body.boxes
         off = np.maximum(*(np.abs(x[:, None] - x).max(axis=2) for x in (low, high)))
-        rounding = self.body.rounding
-        alike = np.count_nonzero(off <= np.minimum.outer(rounding, rounding), axis=1) > 1
+        accepted = self.body.accepted_overlaps(*np.indices(off.shape))
+        alike = np.count_nonzero(off <= accepted, axis=1) > 1
         if not alike.any():
             none = np.zeros(0, dtype=np.intp)
             return none, none, np.zeros(0)
@@ -210,10 +210,10 @@ class _Boundaries:
 
     def _near(self, x: Array, of: Numbers) -> NDArray[np.bool_]:
         """Return which points of bodies are in boxes of other ones. Collective."""
-        rounding, near = self.body.rounding, np.zeros(len(x), dtype=bool)
+        near = np.zeros(len(x), dtype=bool)
         for body, (low, high) in enumerate(zip(*self.body.boxes, strict=True)):
-            touching = np.minimum(rounding[of], rounding[body])[:, None]
-            held = np.all((x > low + touching) & (x < high - touching), axis=1)
+            accepted = self.body.accepted_overlaps(of, np.full_like(of, body))[:, None]
+            held = np.all((x > low + accepted) & (x < high - accepted), axis=1)
             near |= held & (of != body)
         return near
 

@@ -18,7 +18,7 @@ from contact.body.supports import APART
 from contact.errors import InputError
 from contact.interface.mortar.coupling import LEAST_COVERED, Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis
-from contact.interface.mortar.surface import Surface, dual_basis_transformation, surface_of
+from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, Geometry, contact_directions
 from contact.interface.overlaps import Depths
 from contact.interface.placing import check_gap
@@ -49,7 +49,12 @@ class PairPlacement:
     nodes: NDArray[np.int64]  #: global numbers of this rank's nodes with a multiplier, (n,)
     added: Array  #: gap at `nodes` beside that between the meshes, shape (n,) (length)
     press: bool  #: whether overlaps in the reference configuration are interferences
-    rounding: float  #: overlap that counts as rounding (length)
+    negligible: float  #: overlap that changes nothing (length)
+
+    @property
+    def rounding(self) -> float:
+        """Overlap that counts as rounding (length). Collective."""
+        return max(self.negligible, self.body.position_rounding)
 
     def at(self, displacement: Array) -> Geometry:
         """Return the geometry at a displacement of the owned nodes, shape (nodes, d). Collective.
@@ -68,7 +73,7 @@ class PairPlacement:
         gap, cut = coupling.gap, 0.0
         if not self.press and coupling.depth <= self.rounding:
             gap, cut = _without_sagittas(body.comm, coupling)
-            cut = cut if cut > self.rounding else 0.0
+            cut = cut if cut > self.negligible else 0.0
         unknown = body.comm.allreduce(
             max(side.unknown_deviation for side in (slave, master)), op=MPI.MAX
         )
@@ -117,8 +122,7 @@ def find_pair(
     A node whose normal is fixed by a Dirichlet condition is left out, and its multiplier is handed
     over to its neighbours. With friction that is so too where a tangential component is fixed, but
     not on the other side, on which it would act; where both are, or there is no friction, it is
-    removed from the tangent projector. Handed over too are the multipliers of nodes whose functions
-    barely face the master, but on triangles of degree 2; nodes that face nothing are left out.
+    removed from the tangent projector. Nodes that face nothing are left out.
 
     `distance` is added to the gap between the meshes; with `press` the bodies may overlap in the
     reference configuration, and press each other out. `overlap` has the depths of the boundary of
@@ -137,7 +141,6 @@ def find_pair(
     coupling = couple(slave, master, reach)
     beyond, alone = _beyond_rim(slave, coupling)
     no_multiplier: NDArray[np.int64] = np.empty(0, dtype=np.int64)
-    change = dual_basis_transformation(slave.shape, slave.degree)
     while True:
         _, local = owned_among(body.layout.index_map, coupling.nodes)
         points = body.space.tabulate_dof_coordinates()[local, : body.dim]
@@ -147,8 +150,6 @@ def find_pair(
         lost = _without_multiplier(body, slave, coupling, label, part if friction else None)
         if press or least < 0:
             lost = np.union1d(lost, beyond)
-        if np.array_equal(change, np.eye(len(change))):  # else nodes would follow each other
-            lost = np.union1d(lost, slave.owners.among(coupling.barely, slave.nodes.ravel()))
         new = np.setdiff1d(lost, no_multiplier)
         if body.comm.allreduce(new.size, op=MPI.SUM) == 0:
             break
@@ -164,9 +165,9 @@ def find_pair(
             "pair",
         )
     _check_apart(body, coupling, slave.owners, label)
-    rounding = float(body.rounding[body.components_of(part, against)].min())
+    negligible = float(body.negligible_overlaps[body.components_of(part, against)].min())
     placement = PairPlacement(
-        body, slave, master, reach, no_multiplier, coupling.nodes, added, press, rounding
+        body, slave, master, reach, no_multiplier, coupling.nodes, added, press, negligible
     )
     _check_overlap(placement, coupling, overlap, alone, label)
     return placement, placement.geometry(slave, master, coupling)

@@ -51,7 +51,8 @@ class Candidates:
     #: Depth of the nodes, shape (n,) (length), in a shape that the curved surface, or the straight
     #: facets, touch, and rounding.
     chord_penetration: Array
-    rounding: float  #: depth in a shape that counts as rounding (length)
+    negligible: float  #: depth in a shape that changes nothing (length)
+    rounding: float  #: and that counts as rounding (length)
     direction: Array  #: the contact direction, shape (n, d)
     measured: Array  #: the gap from `front`, shape (n,)
     gap: Array  #: from the curve through the corners, shape (n,)
@@ -87,7 +88,7 @@ def find_candidates(
     shape (nodes, d).
     """
     comm, lumped = body.comm, Lumping.of(facets).without_axis(facets)
-    rounding = _rounding(body, part)
+    negligible, rounding = _negligible(body, part)
     # Functions without a mean on Gamma_3 carry nothing: P2 vertices on the axis of revolution.
     size = np.array([lumped.weight.sum(), lumped.weight.size])
     area, count = comm.allreduce(size, op=MPI.SUM)
@@ -123,6 +124,7 @@ def find_candidates(
         front=front,
         # The contact direction may differ a little from the normal.
         chord_penetration=rounding + 1.1 * chord_penetration,
+        negligible=negligible,
         rounding=rounding,
         direction=direction,
         measured=gap,
@@ -133,9 +135,10 @@ def find_candidates(
     )
 
 
-def _rounding(body: BodyEquilibrium, part: str) -> float:
-    """Return the depth of a part in a shape that counts as rounding (length). Collective."""
-    return BY_HAND * float(body.rounding[body.components_of(part)].min())
+def _negligible(body: BodyEquilibrium, part: str) -> tuple[float, float]:
+    """Return depths of a part in a shape that change nothing, and are rounding. Collective."""
+    negligible = BY_HAND * float(body.negligible_overlaps[body.components_of(part)].min())
+    return negligible, max(negligible, BY_HAND * body.position_rounding)
 
 
 def _from_curve(
@@ -172,7 +175,7 @@ class FoundationPlacement:
     def refuse_unresolved(self) -> None:
         """Refuse a shape that cuts facets between their nodes. Collective."""
         try:
-            _refuse_unresolved(self.obstacle, self.facets, _rounding(self.body, self.part))
+            _refuse_unresolved(self.obstacle, self.facets, _negligible(self.body, self.part)[1])
         except InputError as error:
             raise error.within(f"{self.key}.") from None
 
@@ -207,7 +210,7 @@ class FoundationPlacement:
             gap=candidates.of_jumps(gap)[self.contact],
             deviation=candidates.unknown[self.contact],
             block_size=body.block_size,
-            cut=cut if cut > candidates.rounding else 0.0,
+            cut=cut if cut > candidates.negligible else 0.0,
             revolved=body.domain.revolved,
             motion=body.global_unknowns.of_foundation(
                 candidates.places[self.contact], body.block_size, self.part

@@ -273,21 +273,19 @@ class ContactProblem:
         Parts away from the contacts may be much softer.
         """
         where = self.domain, self.description.materials, self.body.cells
-        sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
-        return max(min(young_behind(*where, side) for side in both) for both in sides)
+        return max(min(young_behind(*where, part) for part in both) for both in self._sides)
 
-    @cached_property
-    def contact_size(self) -> float:
-        """Extent of the smallest body at a contact (length). Collective."""
-        names = [name for c in self.contacts for name in (c.on, c.against) if name is not None]
-        body = self.body
-        return float(body.extents[body.components_of(*names)].min())
+    @property
+    def _sides(self) -> list[list[str]]:
+        """The parts of each contact."""
+        return [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
 
     def _interface(self) -> Interface:
         """Return the laws of all contacts at their geometries. Collective."""
         body, geometries = self.body, self.geometries
         nodes = joined_nodes(geometries, [contact.on for contact in self.contacts], body)
-        stiffness = self.contact_young / self.contact_size
+        stiffness, extents = self.contact_young / self.domain.size, body.extents
+        sizes = np.array([extents[body.components_of(*both)].min() for both in self._sides])
         conductors = [contact.conductor for contact in self.contacts]
         law = FoundationLaw(
             nodes=nodes,
@@ -307,6 +305,7 @@ class ContactProblem:
                 conductors, geometries, law, body.layout.index_map.local_range[0]
             ),
             c_0=stiffness,
+            stiffness=self.contact_young / sizes[self.entry_numbers],
             size=self.domain.size,
             elongation=max(elongation(self.domain.mesh, part) for part in facets),
             component=body.component_norms.component[nodes.nodes],

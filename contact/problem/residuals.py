@@ -53,9 +53,9 @@ class Residuals:
         force the reference is the residual of the zero initial guess, and rounding counts as 0.
     contact
         |lambda_c - max(0, lambda_c + c_r (u_nu - rho))| in L2(Gamma_3) over
-        max(|p|, 1e-4 c_0 |g|), p = -sigma_nu, g the gaps up to the displacements
+        max(|p|, 1e-4 E/L |g|), p = -sigma_nu, g the gaps up to the displacements
         (`interface_residuals`); the largest of all connected components. c_r = `Interface.c_r`,
-        c_0 = E/L of the smallest body in contact.
+        L the extent of the smaller body of the contact.
     friction
         |lambda_f - proj_s(lambda_f + c_r u_tau)| over the same, with the final bound s.
     floors

@@ -484,8 +484,8 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
     problem, nodes = solution.problem, solution.problem.nodes
     if nodes.cut > 0:
         yield (
-            f"facets of curved contact surfaces overlap by up to {nodes.cut:.3g}, less "
-            f"than they deviate from the curves: the gap there is taken as 0; accepted: {FINER}"
+            f"contact surfaces overlap by up to {nodes.cut:.3g}, as facets of curves or rounded "
+            f'positions do: the gap there is taken as 0; accepted: {FINER}, or overlap = "press"'
         )
     closed, uncertainty = solution.status != "open", nodes.maximum(nodes.deviation)
     if nodes.maximum(closed.astype(float)) == 0:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import parse_case, solve
+from contact import Problem, parse_case, solve
 from contact.body.description import Body
 from contact.errors import InputError, SingularError
 from contact.linear.operator import SparseOperator
+from contact.mesh.domain import from_mesh
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
@@ -28,6 +29,8 @@ from tests.problems.blocks import Blocks
 from tests.problems.everywhere import agree, at_all, pressures
 from tests.problems.mechanics import constant, solved_by, state_of
 from tests.problems.mechanics import solve as relax
+from tests.problems.meshes import midpoints
+from tests.problems.overlapping import boxes
 from tests.problems.pairs import case
 
 COMM = MPI.COMM_WORLD
@@ -254,3 +257,33 @@ def test_a_rigid_plate_presses_a_block_on_another(comm):
     assert -pushed_in.contact_force[1] == pytest.approx(1.5, rel=1e-9)
     np.testing.assert_allclose(pressures(pushed_in), pressures(pressed), rtol=0, atol=1e-8)
     assert pressed.contact_force == pytest.approx(pushed_in.contact_force, rel=1e-9)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_a_tiny_body_does_not_judge_the_gaps_of_others(mu):
+    """A block that travels half its height onto a plate, and one of a thousandth beside it."""
+    mesh = boxes(COMM, "quadrilateral", 1, [(40, 3), (7, 4), (4, 4)])
+    facets, middle, *_ = midpoints(mesh)
+    body_of = (middle[:, 0] // 2).astype(int)
+    sides = {
+        f"{name}{k}": facets[(body_of == k) & (np.abs(middle[:, 1] - end) < 1e-9)]
+        for k in range(3)
+        for name, end in (("bottom", 0), ("top", 1))
+    }
+    x, tiny, press = mesh.geometry.x, 1e-3, 1e-6
+    k = ((x[:, 0] + 0.5) // 2).astype(int)
+    size, left, low = np.array([[10, 1, tiny], [-5, -2.5, 1], [0, 1.5, 1]])[:, k]
+    x[:, 0] = left + size * (x[:, 0] - 2 * k)
+    x[:, 1] = low + np.where(k == 0, 1, size) * x[:, 1]
+    down = [Fixed("top1", [0.0, -0.5 - press]), Fixed("top2", [0.0, -press * tiny])]
+    body = Body(Linear(1000.0, 0.3), [Fixed("bottom0", [0.0, 0.0]), *down])
+    contacts = [Contact(f"bottom{k}", against="top0", friction=Friction(mu=mu)) for k in (1, 2)]
+    solution = solve(Problem(from_mesh(mesh, sides), body, contacts))
+    assert solution.converged and len(solution.history) < 10
+    young = 1000.0 / (1 - 0.3**2)
+    for entry, width in enumerate((1.0, tiny)):
+        force = solution.problem.nodes.sum(
+            np.where(solution.problem.entry_numbers == entry, solution.pressure, 0.0)
+        )
+        assert 0.5 < force / (young * press * width) < 1.2

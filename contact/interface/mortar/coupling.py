@@ -30,6 +30,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import block_diag
 
 from contact.interface.mortar.lumping import JumpRows, integrals
 from contact.interface.mortar.search import Opposite, nearest_named
@@ -90,11 +91,11 @@ class Parts:
         Those of the nodes whose functions Phi' these are, shape (f, k).
     facet_mass
         int Phi_i N~_j over the part that faces the master, shape (f, k, k).
-    whole
-        int Phi_i over all of the facet, shape (f, k).
-    normal, open_normal
-        int N~_i times the direction where the facets face the master, and int Phi_i times the
-        slave's normal over all of them, shape (f, k, d).
+    normal
+        int N~_i times the direction where the facets face the master, shape (f, k, d).
+    open_nodes, whole, open_normal
+        Before functions that barely face the master are handed over: as `dual_nodes`; int Phi_i
+        over all of the facet, shape (f, k), and that times the slave's normal, shape (f, k, d).
     gap
         int Phi_i times the vector across, everywhere, where the sides do not cut each other, and
         between curved surfaces, shape (f, k, 3, d).
@@ -107,8 +108,9 @@ class Parts:
     nodes: NDArray[np.int64]
     dual_nodes: NDArray[np.int64]
     facet_mass: Array
-    whole: Array
     normal: Array
+    open_nodes: NDArray[np.int64]
+    whole: Array
     open_normal: Array
     gap: Array
     rows: NDArray[np.int64]
@@ -117,14 +119,16 @@ class Parts:
     depths: Array
 
 
-def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> Parts:
+def integrate(
+    slave: Surface, opposite: Opposite, basis: ModifiedDualBasis, open_basis: ModifiedDualBasis
+) -> Parts:
     """Integrate the dual functions of slave facets, alone and with the facets opposite."""
     master = opposite.master
     direction, quadrature = _facing(slave, opposite)
     change = dual_basis_transformation(slave.shape, slave.degree)
     dual, weight = _dual(slave, quadrature, change)
     dual, facet_mass = basis.functions @ dual, basis.functions * weight[:, None, :]
-    whole = np.einsum("fij,fj->fi", basis.functions, integrals(slave))
+    whole = np.einsum("fij,fj->fi", open_basis.functions, integrals(slave))
     gap, normal = np.zeros((*weight.shape, 3)), np.zeros((*weight.shape, direction.shape[1]))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
     for points in quadrature:
@@ -140,8 +144,9 @@ def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> P
         nodes=slave.nodes,
         dual_nodes=basis.nodes,
         facet_mass=facet_mass,
-        whole=whole,
         normal=basis.functions @ normal,
+        open_nodes=open_basis.nodes,
+        whole=whole,
         open_normal=whole[:, :, None] * slave.normal[:, None, :],
         gap=gap[:, :, :, None] * direction[:, None, None, :],
         rows=rows,
@@ -330,14 +335,26 @@ def couple(
     Facets face each other up to the distance `reach` (length). `no_multiplier` has the global
     numbers of slave nodes without multiplier, at least those of this rank and of its facets
     (`ModifiedDualBasis`). `nodes` has those of this rank's nodes with a multiplier, whether they
-    face the master or not; by default they are those that do.
+    face the master or not; by default they are those that do. Functions that barely face the master
+    are handed over to the other nodes of their facets, but on triangles of degree 2, where rows of
+    D have other nodes, which would follow each other.
     """
-    opposite = Opposite.of(slave, master, reach)
-    parts = integrate(slave, opposite, ModifiedDualBasis.of(slave, no_multiplier))
+    opposite, owners = Opposite.of(slave, master, reach), slave.owners
     change = dual_basis_transformation(slave.shape, slave.degree)
-    return _assembled(
-        parts, slave.owners, np.asarray(np.linalg.inv(change.T)), no_multiplier, nodes
+    back, diagonal = (
+        np.asarray(np.linalg.inv(change.T)),
+        bool(np.all(change == np.eye(len(change)))),
     )
+    basis = open_basis = ModifiedDualBasis.of(slave, no_multiplier)
+    while True:
+        parts = integrate(slave, opposite, basis, open_basis)
+        coupling = _assembled(parts, owners, back, no_multiplier, nodes)
+        barely = owners.among(coupling.barely, slave.nodes.ravel()) if diagonal else NOTHING
+        new = np.setdiff1d(barely, no_multiplier)
+        if owners.comm.allreduce(new.size, op=MPI.SUM) == 0:
+            return coupling
+        no_multiplier = np.union1d(no_multiplier, new)
+        basis = ModifiedDualBasis.of(slave, no_multiplier)
 
 
 def _assembled(
@@ -351,16 +368,17 @@ def _assembled(
     f, k, _, d = parts.gap.shape
     # The integral of a quadratic function on the axis of revolution is rounding.
     around = np.broadcast_to(parts.whole.sum(axis=1, keepdims=True), parts.whole.shape)
-    shares = (
-        *(parts.facet_mass.sum(axis=2), parts.whole, around),
-        *(parts.normal, parts.open_normal, parts.gap),
+    facing = parts.facet_mass.sum(axis=2)[..., None], parts.normal, parts.gap.reshape(f, k, 3 * d)
+    alone = parts.whole[..., None], around[..., None], parts.open_normal
+    rows = block_diag(
+        np.concatenate(facing, axis=2).reshape(f * k, 1 + 4 * d),
+        np.concatenate(alone, axis=2).reshape(f * k, 2 + d),
     )
-    numbers, total = owners.sums(
-        parts.dual_nodes.ravel(),
-        np.hstack([part.reshape(f * k, int(np.prod(part.shape[2:]))) for part in shares]),
+    numbers, total = owners.sums(np.append(parts.dual_nodes, parts.open_nodes), rows)
+    weight, *vectors, whole, around, outward = np.split(
+        total, np.cumsum([1, d, d, d, d, 1, 1]), axis=1
     )
-    areas, *vectors = np.split(total, 3 + d * np.arange(5), axis=1)
-    weight, whole, around = areas.T
+    weight, whole, around = weight[:, 0], whole[:, 0], around[:, 0]
     has_area = whole > NEGLIGIBLE * around
     covered = np.where(has_area, weight / np.where(has_area, whole, 1.0), 0.0)
     barely = numbers[(np.abs(weight) > NEGLIGIBLE * around) & (covered <= LEAST_COVERED)]
@@ -369,8 +387,8 @@ def _assembled(
     kept = np.searchsorted(numbers, nodes)
     faces = covered[kept] > LEAST_COVERED
     weight = np.where(faces, weight[kept], whole[kept])
-    normal, outward, *gaps = (vector[kept] for vector in vectors)
-    normal = np.where(faces[:, None], normal, outward)
+    normal, *gaps = (vector[kept] for vector in vectors)
+    normal = np.where(faces[:, None], normal, outward[kept])
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
     gap, positive_part, curved_gap = (
         np.where(faces, np.einsum("nd,nd->n", vector, normal) / weight, np.inf) for vector in gaps

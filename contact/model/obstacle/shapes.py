@@ -125,7 +125,7 @@ class Shape(ABC):
                 for vector in (normal[turned[0]], slope[turned[0]], x[turned[0]])
             )
             words = f"the normal {given} at {place}, where differences of the distances are {there}"
-        return turned.size, np.count_nonzero(np.isfinite(along)), words
+        return turned.size, int(np.count_nonzero(np.isfinite(along))), words
 
     @abstractmethod
     def distance(self, points: Array) -> tuple[Array, Array]:
