@@ -485,7 +485,8 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
     if nodes.cut > 0:
         yield (
             f"contact surfaces overlap by up to {nodes.cut:.3g}, as facets of curves or rounded "
-            f'positions do: the gap there is taken as 0; accepted: {FINER}, or overlap = "press"'
+            f"positions do: the gap there is taken as 0; accepted: of curves {FINER}, of an "
+            'interference overlap = "press"'
         )
     closed, uncertainty = solution.status != "open", nodes.maximum(nodes.deviation)
     if nodes.maximum(closed.astype(float)) == 0:

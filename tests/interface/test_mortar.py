@@ -143,30 +143,46 @@ def test_what_is_partly_covered_still_reproduces_linear_fields(kind) -> None:
     np.testing.assert_allclose(found.gap, 0.05, atol=1e-9)
 
 
+def overhanging(cell, degree, share):
+    """Return a block of the length 1 on a longer one, beside `share` of the last facets of that."""
+    d = 2 if cell in PLANE else 3
+    mesh = boxes(MPI.COMM_WORLD, cell, 1, [[3] * d, [4] * d])
+    facets, middle, *_ = midpoints(mesh)
+    second, height = middle[:, 0] > 1.5, middle[:, d - 1]
+    parts = {"base": ~second & (height < 0.01), "top": ~second & (height > 0.99)}
+    parts |= {"foot": second & (height < 0.01), "head": second & (height > 0.99)}
+    x = mesh.geometry.x
+    above = x[:, 0] > 1.5
+    x[above, 0] -= 2
+    x[above, d - 1] += 1
+    x[~above, 0] *= 1 + share / (3 - share)
+    domain = from_mesh(mesh, {name: facets[there] for name, there in parts.items()}, 2.0)
+    body = Body(Linear(1.0, 0.3), [Fixed("base", [0.0] * d), Fixed("head", [0.0] * d)])
+    return Problem(domain, body, Contact("top", against="foot"), degree=degree)
+
+
 @pytest.mark.parallel
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("cell", [*PLANE, *SPACE])
 def test_areas_of_a_partly_covered_side_are_those_of_the_other(cell, degree) -> None:
     """Quadratic functions have negative areas on parts of facets: others have to carry these."""
-    d = 2 if cell in PLANE else 3
     for share in (0.02, 0.3, 0.5, 0.7, 0.98):
-        mesh = boxes(MPI.COMM_WORLD, cell, 1, [[3] * d, [4] * d])
-        facets, middle, *_ = midpoints(mesh)
-        second, height = middle[:, 0] > 1.5, middle[:, d - 1]
-        parts = {"base": ~second & (height < 0.01), "top": ~second & (height > 0.99)}
-        parts |= {"foot": second & (height < 0.01), "head": second & (height > 0.99)}
-        x = mesh.geometry.x
-        above = x[:, 0] > 1.5
-        x[above, 0] -= 2
-        x[above, d - 1] += 1
-        x[~above, 0] *= 1 + share / (3 - share)  # `share` of the last facets is beside the master
-        domain = from_mesh(mesh, {name: facets[there] for name, there in parts.items()}, 2.0)
-        body = Body(Linear(1.0, 0.3), [Fixed("base", [0.0] * d), Fixed("head", [0.0] * d)])
-        nodes = Problem(domain, body, Contact("top", against="foot"), degree=degree).nodes
+        nodes = overhanging(cell, degree, share).nodes
         # On triangles of degree 2 they are dropped, and small.
         close = 1e-4 if (cell, degree) == ("tetrahedron", 2) else 1e-12
         assert nodes.sum(np.ones_like(nodes.weight)) == pytest.approx(1.0, rel=close)
         assert nodes.maximum(-nodes.weight, -1.0) < 0
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("cell", [*PLANE, *SPACE])
+def test_slivers_of_facets_carry_nothing_or_reproduce_constants(cell, degree) -> None:
+    """The mass of quadratic functions on them is singular to rounding."""
+    for sliver in (1e-8, 1e-6, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2):
+        (geometry,) = overhanging(cell, degree, 1 - sliver).geometries
+        jumps = geometry.jumps
+        for rows in (jumps.D, jumps.M):
+            np.testing.assert_allclose(rows.sum(axis=1), 1.0, rtol=0, atol=1e-8)
 
 
 @pytest.mark.core

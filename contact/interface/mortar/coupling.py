@@ -59,18 +59,22 @@ class ModifiedDualBasis:
     functions: Array  #: the functions by the facet's own, shape (f, k, k)
 
     @staticmethod
-    def of(slave: Surface, no_multiplier: NDArray[np.int64]) -> ModifiedDualBasis:
+    def of(
+        slave: Surface, no_multiplier: NDArray[np.int64], barely: NDArray[np.int64] = NOTHING
+    ) -> ModifiedDualBasis:
         """Return the basis without functions of some nodes, given by global numbers. Collective.
 
         m_jk is the same for the other nodes j of a facet; on one without any it is 1 for the
-        nearest corner of another facet, of any rank.
+        nearest corner of another facet, of any rank. If some of its nodes `barely` face the master,
+        its functions, which are small, are left out.
         """
-        gone = np.isin(slave.nodes, no_multiplier)
+        without = np.isin(slave.nodes, no_multiplier)
+        gone = without | np.isin(slave.nodes, barely)
         kept = ~gone
         among = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
         functions = among[:, :, None] * gone[:, None, :] + kept[:, :, None] * np.eye(gone.shape[1])
         nodes, corners = slave.nodes.copy(), kept[:, : slave.corners.shape[1]]
-        alone = np.flatnonzero(gone.all(axis=1))
+        alone = np.flatnonzero(without.all(axis=1))
         names, places = slave.nodes[:, : corners.shape[1]][corners], slave.corners[corners]
         beside = nearest_named(slave.owners.comm, slave.centres[alone], places, names)
         alone, beside = alone[beside >= 0], beside[beside >= 0]
@@ -186,6 +190,10 @@ def _normals(points: Points, slave: Surface, master: Surface, direction: Array) 
     return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
 
 
+#: Share of a facet of degree 2 that faces the master, up to which it counts as facing nothing.
+SLIVER = 1e-3
+
+
 def _dual(slave: Surface, quadrature: Sequence[Points], change: Array) -> tuple[Array, Array]:
     """Return C of the dual functions Phi = C N~, (f, k, k), and int N~ where they face, (f, k)."""
     k = change.shape[0]
@@ -194,7 +202,9 @@ def _dual(slave: Surface, quadrature: Sequence[Points], change: Array) -> tuple[
         n = _functions(points, slave, change)
         _add(mass, points.slave, points.weight[:, None, None] * n[:, :, None] * n[:, None, :])
         _add(weight, points.slave, points.weight[:, None] * n)
-    faces = weight.sum(axis=1) > NEGLIGIBLE * integrals(slave).sum(axis=1)
+    # The mass of quadratic functions on a sliver is singular to rounding.
+    least = NEGLIGIBLE if slave.degree == 1 else SLIVER
+    faces = weight.sum(axis=1) > least * integrals(slave).sum(axis=1)
     dual = np.zeros_like(mass)
     dual[faces] = weight[faces, :, None] * np.linalg.inv(mass[faces])
     return dual, np.where(faces[:, None], weight, 0.0)
@@ -346,15 +356,17 @@ def couple(
         bool(np.all(change == np.eye(len(change)))),
     )
     basis = open_basis = ModifiedDualBasis.of(slave, no_multiplier)
+    barely = NOTHING
     while True:
         parts = integrate(slave, opposite, basis, open_basis)
-        coupling = _assembled(parts, owners, back, no_multiplier, nodes)
-        barely = owners.among(coupling.barely, slave.nodes.ravel()) if diagonal else NOTHING
-        new = np.setdiff1d(barely, no_multiplier)
+        without = np.union1d(no_multiplier, barely)
+        coupling = _assembled(parts, owners, back, without, nodes)
+        found = owners.among(coupling.barely, slave.nodes.ravel()) if diagonal else NOTHING
+        new = np.setdiff1d(found, without)
         if owners.comm.allreduce(new.size, op=MPI.SUM) == 0:
             return coupling
-        no_multiplier = np.union1d(no_multiplier, new)
-        basis = ModifiedDualBasis.of(slave, no_multiplier)
+        barely = np.union1d(barely, new)
+        basis = ModifiedDualBasis.of(slave, no_multiplier, barely)
 
 
 def _assembled(
