@@ -11,7 +11,7 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from numpy.typing import ArrayLike
 
-from contact import Body, Contact, Fixed, InputError, Linear, Load, Problem
+from contact import Body, Contact, Fixed, InputError, Linear, Load, Problem, Solution
 from contact._compat import geometry_dofmap
 from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain, from_mesh, revolved
@@ -165,3 +165,9 @@ def pressure(form: str, depth: float, radii: Sequence[float] = RADII) -> float:
     inside, outside = (c, a), (b - depth, c - depth)
     stretch = sum((x**2 + y**2) / (x**2 - y**2) for x, y in (inside, outside))
     return depth * YOUNG / ((1 - POISSON**2) * c * stretch)
+
+
+def mean(solution: Solution) -> float:
+    """Return the mean pressure of a solution."""
+    nodes = solution.problem.nodes
+    return nodes.sum(solution.pressure) / nodes.sum(np.ones_like(nodes.weight))

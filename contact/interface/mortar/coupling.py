@@ -124,11 +124,17 @@ class Parts:
 
 
 def integrate(
-    slave: Surface, opposite: Opposite, basis: ModifiedDualBasis, open_basis: ModifiedDualBasis
+    slave: Surface,
+    master: Surface,
+    facing: tuple[Array, list[Points]],
+    basis: ModifiedDualBasis,
+    open_basis: ModifiedDualBasis,
 ) -> Parts:
-    """Integrate the dual functions of slave facets, alone and with the facets opposite."""
-    master = opposite.master
-    direction, quadrature = _facing(slave, opposite)
+    """Integrate the dual functions of slave facets, alone and with the facets opposite.
+
+    `facing` has directions and points (`_facing`).
+    """
+    direction, quadrature = facing
     change = dual_basis_transformation(slave.shape, slave.degree)
     dual, weight = _dual(slave, quadrature, change)
     dual, facet_mass = basis.functions @ dual, basis.functions * weight[:, None, :]
@@ -350,6 +356,7 @@ def couple(
     D have other nodes, which would follow each other.
     """
     opposite, owners = Opposite.of(slave, master, reach), slave.owners
+    facing = _facing(slave, opposite)
     change = dual_basis_transformation(slave.shape, slave.degree)
     back, diagonal = (
         np.asarray(np.linalg.inv(change.T)),
@@ -358,7 +365,7 @@ def couple(
     basis = open_basis = ModifiedDualBasis.of(slave, no_multiplier)
     barely = NOTHING
     while True:
-        parts = integrate(slave, opposite, basis, open_basis)
+        parts = integrate(slave, opposite.master, facing, basis, open_basis)
         without = np.union1d(no_multiplier, barely)
         coupling = _assembled(parts, owners, back, without, nodes)
         found = owners.among(coupling.barely, slave.nodes.ravel()) if diagonal else NOTHING
