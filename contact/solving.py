@@ -6,7 +6,7 @@
                          > evaluated            all residuals from scratch
           > reviewed                            warnings
 
-The calls from there to the linear solve are in docs/architecture.md, Data flow.
+The calls from there to the linear solve are in docs/architecture.md.
 """
 
 from __future__ import annotations

@@ -80,7 +80,9 @@ def run_bar(folder: Path) -> int:
 
 def anchors(page: Path) -> set[str]:
     """Return the headings of a page as the ends of links, in GitHub's spelling."""
-    prose = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.M | re.S)
+    included = re.findall(r"^```{include} (\S+\.md)$", page.read_text(), re.M)
+    texts = [one.read_text() for one in (page, *(page.parent / name for name in included))]
+    prose = re.sub(r"^```.*?^```", "", "\n".join(texts), flags=re.M | re.S)
     words = [re.sub(r"[^\w\- ]", "", x).lower() for x in re.findall(r"^#+ (.*)$", prose, re.M)]
     return {heading.replace(" ", "-") for heading in words}
 
@@ -206,15 +208,37 @@ def test_files_that_pages_name_are_there() -> None:
     assert len(named) > 20 and not [name for name in missing if "NAME" not in name]
 
 
+def file_named(name: str) -> str:
+    """Return the text of a file in `contact/`, or of the folders beside it."""
+    (path,) = (path for root in ("contact", ".") if (path := ROOT / root / name).is_file())
+    return path.read_text(encoding="utf-8")
+
+
 def test_equations_lead_to_names_that_are_there() -> None:
-    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
-    section = page.split("## The equations")[1].split("\n## ")[0]
+    section = (DOCS / "theory.md").read_text().split("## Equations of the thesis")[1]
     places = re.findall(r"`([\w/]+\.py)`((?:[:,] `\w+`)*)", section)
-    assert len(places) > 25
+    assert len(places) > 14
     for file, names in places:
-        (path,) = (path for root in ("contact", ".") if (path := ROOT / root / file).is_file())
-        defined = re.findall(r"(?:def|class) (\w+)", path.read_text(encoding="utf-8"))
+        defined = re.findall(r"(?:def|class) (\w+)", file_named(file))
         assert {*re.findall(r"`(\w+)`", names)} <= {*defined}, file
+
+
+def test_the_architecture_and_how_to_add_name_what_is_there() -> None:
+    page = (DOCS / "architecture.md").read_text()
+    steps = (ROOT / "CONTRIBUTING.md").read_text().split("## How to add")[1].split("\n## ")[0]
+    calls = page.split("```text\n")[1].split("```")[0]
+    files = re.findall(r"`(\w[\w-]*/[\w/-]+\.(?:pyi?|md|toml|bib))`", page + steps)
+    files += re.findall(r"\w+/\w+\.py", calls)
+    assert len(files) > 50
+    tops = ("contact", "forms", "meshes")
+    modules = [path for top in tops for path in (ROOT / top).rglob("*.py")]
+    sources = [file_named(file) for file in files if "NAME" not in file]
+    sources += [path.read_text() for path in modules]
+    known = {*re.findall(r"\w+", "".join(sources))} | {path.stem for path in modules}
+    names = re.findall(r"`([A-Za-z_]\w*(?:\.\w+)*)`", page + steps)
+    for line in calls.splitlines():
+        names += re.findall(r"\b[a-z]+_\w+|\b[A-Z][a-z]\w*", line.split("   ")[0])
+    assert {part for name in names for part in name.split(".")} <= known
 
 
 def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
