@@ -33,6 +33,9 @@ from contact.typing import Array
 #: Share of a facet that faces the master, if its nodes are not beyond the rim of that.
 FACES = 0.9
 
+#: How an interference is said.
+PRESSED = 'overlap = "press" (in Python press=True)'
+
 #: Share of the mesh's extent up to which facets are taken to face each other.
 REACH = 0.25
 
@@ -198,8 +201,9 @@ def _check_overlap(
         return
     if drawn and _connected(body, coupling, owners):
         raise InputError(
-            f"{label} are sides of one body that look away from each other; accepted: parts of "
-            "two bodies whose meshes are apart",
+            f"{label} are sides of one body that overlap, by up to {depth:.3g}, or that look away "
+            f"from each other; accepted: parts that face each other and are apart, or {PRESSED} "
+            "for an interference",
             "pair",
         )
     turns = drawn and any([_turns(side) for side in (pair.slave, pair.master)])
@@ -313,9 +317,8 @@ def _check_rim(
     facets, filled = body.domain.facets(part), False
     for support in body.description.fixed:
         supported = np.isin(facets, body.domain.facets_anywhere(support.on))
-        for component, nodes in zip(support.displacement or (), lost, strict=False):
-            if component is not None:
-                filled |= bool((supported & np.isin(slave.nodes, nodes).all(axis=1)).any())
+        for k in support.components:
+            filled |= bool((supported & np.isin(slave.nodes, lost[k]).all(axis=1)).any())
     if body.comm.allreduce(filled, op=MPI.LOR):
         raise InputError(
             f"{label}: supports hold the first along its surface, where friction would pull at "
@@ -328,8 +331,7 @@ def _overlap(
     depth: float, drawn: bool, resolved: bool, label: str, turns: bool = False
 ) -> InputError:
     """Return the error of an overlap, drawn or by the gap, given whether nodes resolve it."""
-    drawn_way = 'overlap = "press" (in Python press=True)'
-    bodies, way = ("bodies", drawn_way) if drawn else ("bodies and the gap", "a gap below 0")
+    bodies, way = ("bodies", PRESSED) if drawn else ("bodies and the gap", "a gap below 0")
     way += " for an interference"
     if not resolved:
         way += (

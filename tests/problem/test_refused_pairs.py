@@ -1,10 +1,28 @@
 """Pairs of bodies that are refused, and what is said of the others."""
 
+import numpy as np
 import pytest
+from mpi4py import MPI
 
-from contact import InputError, build_problem, parse_case, solve
+from contact import (
+    Body,
+    Contact,
+    Fixed,
+    Friction,
+    InputError,
+    Linear,
+    Problem,
+    build_problem,
+    parse_case,
+    solve,
+)
 from contact.cli.check import expectations
+from contact.mesh.domain import from_mesh
+from tests.problems.meshes import midpoints
+from tests.problems.overlapping import boxes
 from tests.problems.pairs import case
+
+COMM = MPI.COMM_WORLD
 
 
 @pytest.mark.parametrize(
@@ -61,3 +79,28 @@ def test_bodies_that_may_pass_through_each_other_are_named():
     )
     apart = solve(parse_case(case()))
     assert not any("pass through" in w for w in (*apart.warnings, *expectations(apart.problem)))
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("along", ["free", 0.0])
+def test_supports_of_the_first_along_its_surface(along):
+    """Its rim is held along z; on its facets themselves only y may be, as that of the second is."""
+    mesh = boxes(COMM, "hexahedron", 1, [[1, 4, 1], [2, 2, 2]])
+    facets, middle, *_ = midpoints(mesh)
+    (x, y, z), first = middle[:, :3].T, middle[:, 0] < 1.5
+    rim = first & (np.minimum(z, 1 - z) < 1e-9) & (y < 0.5)
+    places = {"end": x < 1e-9, "on": first & (x > 1 - 1e-9), "rim": rim, "base": x > 3 - 1e-9}
+    places["against"] = ~first & (x < 2 + 1e-9)
+    mesh.geometry.x[mesh.geometry.x[:, 0] > 1.5, 0] -= 1
+    domain = from_mesh(mesh, {name: facets[there] for name, there in places.items()}, 2.0)
+    held = [
+        Fixed("end", [1e-3, "free", "free"]), Fixed("base", [0.0, 0.0, 0.0]),
+        Fixed("rim", ["free", "free", 0.0]), Fixed("on", ["free", 0.0, along]),
+        Fixed("against", ["free", 0.0, "free"]),
+    ]  # fmt: skip
+    given = Body(Linear(1.0, 0.3), held), Contact("on", against="against"), Friction(mu=0.3)
+    if along == "free":
+        assert COMM.allreduce(Problem(domain, *given).nodes.weight.size) >= 4
+    else:
+        with pytest.raises(InputError, match=r"\[held-side\]"):
+            Problem(domain, *given)

@@ -26,14 +26,17 @@ from contact import (
     parse_case,
     solve,
 )
+from contact._compat import geometry_dofmap
 from contact.cli.check import expectations
 from contact.cli.new import facing_parts
 from contact.errors import InputError
 from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.surface import Surface
+from contact.mesh.domain import from_mesh
 from contact.mesh.grid import box, rectangle
 from contact.problem.checks import check_problem
 from tests.problems import overlapping
+from tests.problems.meshes import assembled, midpoints
 from tests.problems.overlapping import (
     ELEMENTS,
     PLANE,
@@ -607,6 +610,30 @@ def test_a_gap_makes_up_for_a_drawn_overlap():
         np.testing.assert_allclose(nodes.gap, 0.02, rtol=1e-9)
         with pytest.raises(InputError, match=r"by up to 0.004 more .*\[overlap\]"):
             Problem(domain, given, Contact(on, 0.006, against=against))
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("cell", PLANE)
+def test_sides_of_one_body_that_overlap(cell):
+    """The arms of a C, the upper one bent into the lower one."""
+    grid = rectangle(MPI.COMM_SELF, (0.0, 0.0), (6.0, 6.0), (6, 6), cell=cell).mesh
+    x, cells = grid.geometry.x[:, :2].copy(), geometry_dofmap(grid)
+    centre = x[cells].mean(axis=1)
+    notch = (np.abs(centre[:, 1] - 3) < 1) & (centre[:, 0] > 2)
+    used, cells = np.unique(cells[~notch], return_inverse=True)
+    mesh = assembled(COMM, x[used], cells.reshape(-1, 3 if cell == "triangle" else 4), cell, 1)
+    facets, middle, *_ = midpoints(mesh)
+    arms = middle[:, 0] > 3
+    sides = {f"arm{y}": arms & (np.abs(middle[:, 1] - y) < 1e-9) for y in (2, 4)}
+    sides["left"] = middle[:, 0] < 1e-9
+    x, depth = mesh.geometry.x, 0.1
+    x[(x[:, 1] > 3.5) & (x[:, 0] > 2.5), 1] -= 2 + depth
+    domain = from_mesh(mesh, {name: facets[there] for name, there in sides.items()}, 6.0)
+    given = Body(Linear(YOUNG, POISSON), Fixed("left", [0.0, 0.0]))
+    with pytest.raises(InputError, match=r"overlap, by up to 0.1, .*press.*\[pair\]"):
+        Problem(domain, given, Contact("arm4", against="arm2"))
+    pressed = solve(Problem(domain, given, Contact("arm4", against="arm2", press=True)))
+    assert pressed.converged and mean(pressed) > 0
 
 
 @pytest.mark.parallel
