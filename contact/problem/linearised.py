@@ -284,8 +284,10 @@ class Linearised:
                 "for derivatives; accepted: a smaller radius or coefficient of friction",
                 "smoothed-pressure",
             )
-        # Rounding, or linear convergence; the first corrections may grow by the smoothed pressure.
-        return (now >= last and now <= WEAK * size) or now**2 <= EPS * size * min(last, size)
+        # Linear convergence, or rounding if two corrections in turn are not smaller: those of
+        # multigrid shrink unevenly. The first ones may grow by the smoothed pressure.
+        rounding = now <= WEAK * size and min(taken[-2:]) >= min(taken[:-2], default=np.inf)
+        return rounding or now**2 <= EPS * size * min(last, size)
 
     def _norm(self, x: Array, f: Array) -> float:
         """Return |x| + EPS |f|."""
