@@ -7,7 +7,6 @@ computed from the same input.
 
 from __future__ import annotations
 
-import csv
 import itertools
 import logging
 import time
@@ -25,7 +24,7 @@ from contact.case.digest import check_files, check_same, digest
 from contact.case.file import Case, literal, load_case, to_toml
 from contact.errors import InputError, counted, nearest
 from contact.io.folder import write_whole
-from contact.io.tables import write_csv
+from contact.io.tables import read_rows, write_csv
 from contact.mesh.domain import Domain
 from contact.methods.load_stepping import predicted
 from contact.methods.method import METHODS, Method, solve_step
@@ -225,7 +224,9 @@ def _kept_rows(
     the `first` values; `load` returns the case of values, from the case file or from another.
     """
     table, before, where = folder / TABLE, folder / CASE, f"--out {folder}"
-    rows = _read(table) if table.exists() else []
+    header, rows = read_rows(table) if table.exists() else (COLUMNS, [])
+    if not {*COLUMNS} <= {*header}:
+        raise _refused(f"{table}: damaged, or no table of a sweep of this version")
     swept = [*itertools.takewhile(lambda column: column != "converged", rows[0] if rows else names)]
     if swept != names:
         raise _refused(
@@ -252,19 +253,6 @@ def _kept_rows(
 
 def _refused(words: str, accepted: str = "") -> InputError:
     return InputError(f"{words}; accepted: {accepted}another folder", "sweep-table")
-
-
-def _read(table: Path) -> list[dict[str, str]]:
-    """Return the rows of a table that a sweep has left."""
-    try:
-        with table.open(newline="", encoding="utf-8-sig") as file:
-            header, *rows = csv.reader(file, strict=True)
-        found = [dict(zip(header, row, strict=True)) for row in rows]
-    except (ValueError, csv.Error):
-        header, found = [], []
-    if not {*COLUMNS} <= {*header}:
-        raise _refused(f"{table}: damaged, or no table of a sweep of this version")
-    return found
 
 
 def _write(folder: Path, rows: Sequence[Mapping[str, Any]], first: Case) -> None:

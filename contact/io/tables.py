@@ -24,6 +24,16 @@ def write_csv(
         writer.writerows(rows)
 
 
+def read_rows(path: Path) -> tuple[list[str], list[dict[str, str]]]:
+    """Read the header and the rows of a table; nothing of a damaged one."""
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        try:
+            header, *rows = csv.reader(file, strict=True)
+            return header, [dict(zip(header, row, strict=True)) for row in rows]
+        except (ValueError, csv.Error):
+            return [], []
+
+
 def write_columns(path: Path, columns: Table, more: bool = False) -> None:
     """Write columns of equal length, or more rows of a table."""
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError, nearest
 from contact.io.folder import write_whole
+from contact.io.tables import read_rows
 from contact.plot.contact import patches, position, shown, zones
 from contact.plot.run import Run
 from contact.plot.style import (
@@ -238,11 +238,9 @@ def read_sweep(folder: Path) -> Swept:
     """Read the table of a sweep, and the case beside it."""
     path = folder / SWEEP
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            header, *texts = csv.reader(file, strict=True)
+        header, rows = read_rows(path)
         keys = header[: header.index("converged")]
-        rows = [dict(zip(header, row, strict=True)) for row in texts]
-    except (OSError, ValueError, csv.Error):
+    except (OSError, ValueError):
         keys, rows = [], []
     if not keys or not rows:
         raise InputError(
