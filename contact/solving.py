@@ -1,9 +1,10 @@
 """Solve a case or a problem: one step, or one load step after the other.
 
     solve > build_problem                       a case becomes a `ContactProblem`
-          > solve_problem                       `solve_step` once, or `LoadStepping`
-            > solve_step > Method.solve         by `contact.methods` or `contact.thesis`
-                         > evaluated            all residuals from scratch
+          > solve_problem                       makes a method, looks for other solutions
+            > solve_static                      or `solve_in_steps` > `LoadStepping`
+              > solve_step > Method.solve       by `contact.methods` or `contact.thesis`
+                           > evaluated          all residuals from scratch
           > reviewed                            warnings
 
 The calls from there to the linear solve are in docs/architecture.md.
@@ -125,24 +126,29 @@ def solve(
     start = start.state if isinstance(start, results.Solution) else start
     case, options = _checked(case, settings, monitor, start, replacements)
     if isinstance(case, ContactProblem):
-        return reviewed(solve_problem(case, options, monitor, start))
-    solver = partial(solve_problem, settings=options, monitor=monitor, times=step_times(case))
+        start = None if start is None else _prescribed(case, start)
+        return reviewed(solve_problem(case, options, monitor, partial(solve_static, start=start)))
+    evolution = case.evolution
+
+    def solver(problem: ContactProblem, start: State | None, guess: str = COARSE) -> Solution:
+        if evolution is None:
+            step = partial(solve_static, start=start, guess=guess)
+        else:
+            step = partial(solve_in_steps, times=evolution.step_times)
+        return solve_problem(problem, options, monitor, step)
+
     with naming_case(case.source):
         if case.adapt is not None:
-            solution = adapted(case, comm, partial(solver, guess=COARSE))
+            solution = adapted(case, comm, solver)
         else:
             problem, guess = build_problem(case, comm, **replacements), GIVEN
-            if start is None:
+            if start is not None:
+                start = _prescribed(problem, start)
+            else:
                 chosen = case.model_copy(update={"solver": options})
                 start, guess = default_start(chosen, problem, **replacements), COARSE
-            solution = solver(problem, start=start, guess=guess)
+            solution = solver(problem, start, guess)
         return reviewed(solution, case, clock, described=not replacements)
-
-
-def step_times(case: Case) -> tuple[float, ...]:
-    """Return the begin and the ends of the load steps of a case; nothing of a static one."""
-    evolution = case.evolution
-    return () if evolution is None else (evolution.times[0], *evolution.ends)
 
 
 def solve_steps(
@@ -176,9 +182,8 @@ def solve_steps(
     expect("solve_steps", problem, "a Problem", isinstance(problem, ContactProblem))
     _check_types(settings, monitor)
     ends = _checked_times(problem, times, 0.0)
-    options = settings or NewtonOptions()
-    solution = solve_problem(problem, options, monitor, times=(0.0, *ends), kept=kept, keep=keep)
-    return reviewed(solution)
+    steps = partial(solve_in_steps, times=(0.0, *ends), kept=kept, keep=keep)
+    return reviewed(solve_problem(problem, settings or NewtonOptions(), monitor, steps))
 
 
 def evolve(
@@ -243,57 +248,87 @@ def evolve(
         yield state
 
 
+def solve_static(
+    problem: ContactProblem, method: Method, start: State | None = None, guess: str = GIVEN
+) -> Solution:
+    """Solve the step to a problem's own time. Collective.
+
+    `start` is the initial guess, None for zero, and `guess` its name in messages.
+    """
+    state, outcome = solve_step(problem, method, start)
+    history, name = [*outcome.records], method.options.method
+    words = ZERO if start is None else guess
+    return Solution(problem, state, outcome, history, method.counters, name, {}, start=words)
+
+
+def solve_in_steps(
+    problem: ContactProblem,
+    method: Method,
+    times: Sequence[float],
+    kept: Sequence[StepRecord] = (),
+    keep: Callable[[StepRecord], None] | None = None,
+) -> Solution:
+    """Solve load steps; `times` are their begin and ends. Collective.
+
+    `kept` are the records of the steps of an earlier run, to continue from, and `keep` is called
+    with that of each step. A signal or a step that fails ends the steps; all complete ones remain.
+    The solution is the last of them, or the iterate of the first step if there is none, with the
+    outcome of the step that has ended them and the outer iterations of all.
+    """
+    records = [*kept]
+    recorder = StepRecorder(problem, records[-1] if records else None)
+    history, outcome, begin, end = list[Record](), None, times[0], times[-1]
+    states = [record.state for record in records[-1:-3:-1]]
+    tell(logger, 0.0, "steps to t = %g", end)
+    stepping = LoadStepping(problem, method, *states)
+    for state, outcome in stepping.steps(times[1:], begin):
+        now, taken = state.time, outcome.records
+        history += [replace(r, note=f"t = {now:g} {r.note}".strip()) for r in taken]
+        if outcome.converged:
+            records.append(recorder.record(state, outcome))
+            if keep is not None:
+                keep(records[-1])
+            share = (now - begin) / (end - begin)
+            words = "t = %g of %g: iterations %d, residual %.1e"
+            tell(logger, share, words, now, end, len(taken), outcome.residuals.largest)
+    reached = 0.0
+    if records:
+        state, reached = records[-1].state, records[-1].state.time
+    here = problem.at(state.time, state.history)
+    if outcome is None:  # all were there already
+        outcome = Outcome(evaluate(here, state), method.options.allowed)
+    elif not outcome.converged:
+        words = outcome.ended or outcome.criterion or f"the one to {now:g} fails"
+        ended = f"the steps end at t = {reached:g} of {end:g}: {words}"
+        outcome = replace(outcome, ended=ended)
+    counters, name, guess = method.counters, method.options.method, BEFORE if records else ZERO
+    return Solution(here, state, outcome, history, counters, name, {}, start=guess, steps=records)
+
+
 def solve_problem(
     problem: ContactProblem,
     settings: Options,
     monitor: Monitor | None = None,
-    start: State | None = None,
-    guess: str = GIVEN,
-    times: Sequence[float] = (),
-    kept: Sequence[StepRecord] = (),
-    keep: Callable[[StepRecord], None] | None = None,
+    solver: Callable[[ContactProblem, Method], Solution] = solve_static,
 ) -> Solution:
-    """Solve a problem in one step or in several; `reviewed` gives the warnings. Collective.
-
-    A signal or a step that fails ends the steps; all complete ones remain, with the outcome of the
-    one that has ended them. `start` is the initial guess of a single step, None for zero, and
-    `guess` its name in messages. `times` are begin and ends of the load steps; none for a single
-    step to the problem's own time. `kept` are the records of the steps of an earlier run, to
-    continue from, and `keep` is called with that of each step.
-    """
+    """Solve a problem by a new method, and look for other solutions; not reviewed. Collective."""
     clock = time.perf_counter()
     check_variables(problem.body)
-    start = None if start is None else _prescribed(problem, start)
-    records = list(kept)
     with stop_on_signal(problem.comm, monitor) as stop:
         method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - clock
-        if times:
-            here, state, outcome, history = _take_steps(problem, method, times, records, keep)
-        else:
-            state, outcome = solve_step(problem, method, start)
-            here, history = problem, [*outcome.records]
+        solution = solver(problem, method)
     solved = time.perf_counter() - clock - setup
-    counters = method.counters
+    solution.seconds = {"setup": setup, "solve": solved, "output": 0.0}
+    here, state = solution.problem, solution.state
     body = method.condensation if isinstance(method, Newton) else None
-    critical, jammed = uniqueness(here, state, body) if outcome.converged else (np.inf, False)
+    if solution.converged:
+        solution.critical_factor, solution.jammed = uniqueness(here, state, body)
     # The review needs the memory that the method's operators take.
     del method, body
     destroy_unused(problem.comm, problem.domain.mesh.comm)
     check_potential(here, state)
-    return Solution(
-        problem=here,
-        state=state,
-        outcome=outcome,
-        history=history,
-        counters=counters,
-        method=settings.method,
-        start=BEFORE if records else ZERO if start is None else guess,
-        seconds={"setup": setup, "solve": solved, "output": 0.0},
-        steps=records,
-        critical_factor=critical,
-        jammed=jammed,
-    )
+    return solution
 
 
 def reviewed(
@@ -315,46 +350,6 @@ def reviewed(
         ended = _CtrlC if solution.outcome.signal == signal.SIGINT else SolveInterrupted
         raise ended(solution)
     return solution
-
-
-def _take_steps(
-    problem: ContactProblem,
-    method: Method,
-    times: Sequence[float],
-    records: list[StepRecord],
-    keep: Callable[[StepRecord], None] | None,
-) -> tuple[ContactProblem, State, Outcome, list[Record]]:
-    """Take load steps, and append the records of those that converge. Collective.
-
-    Returned are the last step that is recorded, or the iterate of the first one if none is, the
-    outcome of the last one, with the time that was reached, and the outer iterations of all.
-    """
-    recorder = StepRecorder(problem, records[-1] if records else None)
-    history, outcome, begin, end = list[Record](), None, times[0], times[-1]
-    states = [record.state for record in records[-1:-3:-1]]
-    tell(logger, 0.0, "steps to t = %g", end)
-    stepping = LoadStepping(problem, method, *states)
-    for state, outcome in stepping.steps(times[1:], begin):
-        now, taken = state.time, outcome.records
-        history += [replace(r, note=f"t = {now:g} {r.note}".strip()) for r in taken]
-        if outcome.converged:
-            records.append(recorder.record(state, outcome))
-            if keep is not None:
-                keep(records[-1])
-            share = (now - begin) / (end - begin)
-            words = "t = %g of %g: iterations %d, residual %.1e"
-            tell(logger, share, words, now, end, len(taken), outcome.residuals.largest)
-    reached = 0.0
-    if records:
-        state, reached = records[-1].state, records[-1].state.time
-    here = problem.at(state.time, state.history)
-    if outcome is None:  # all were there already
-        return here, state, Outcome(evaluate(here, state), method.options.allowed), history
-    if not outcome.converged:
-        words = outcome.ended or outcome.criterion or f"the one to {now:g} fails"
-        ended = f"the steps end at t = {reached:g} of {end:g}: {words}"
-        outcome = replace(outcome, ended=ended)
-    return here, state, outcome, history
 
 
 def _prescribed(problem: ContactProblem, start: State) -> State:

@@ -13,6 +13,7 @@ import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from contact.io.folder import write_whole
 from contact.io.tables import read_rows, write_csv
 from contact.mesh.domain import Domain
 from contact.methods.load_stepping import predicted
-from contact.methods.method import METHODS, Method, solve_step
+from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
 from contact.methods.signals import Interrupted, stop_on_signal
@@ -40,7 +41,7 @@ from contact.results.quantities import quantities, values_of
 from contact.results.quantity import SUMMARY, SWEEP, is_of
 from contact.results.remarks import evaluate_extremes
 from contact.solution import Solution
-from contact.solving import solve_problem, step_times
+from contact.solving import solve_in_steps, solve_problem, solve_static
 from contact.typing import Array
 
 logger = logging.getLogger("contact.sweep")
@@ -288,7 +289,8 @@ class _Runner:
         self._domain = problem.domain
         with naming_case(case.source):
             if case.evolution is not None:
-                return solve_problem(problem, case.solver, self._monitor, times=step_times(case))
+                steps = partial(solve_in_steps, times=case.evolution.step_times)
+                return solve_problem(problem, case.solver, self._monitor, steps)
             if self._method is None or before is None or not _alike(before, case):
                 self._method = METHODS[case.solver.method](
                     problem, self._settings(case), self._monitor
@@ -296,7 +298,7 @@ class _Runner:
                 self._ends = []
             else:
                 self._method.set_load_step(problem)
-            return self._static(problem, case.solver.method, self._method)
+            return self._static(problem, self._method)
 
     def _settings(self, case: Case) -> Options:
         """Return the method's options: the factorisation of a case may serve the next one."""
@@ -304,16 +306,16 @@ class _Runner:
             return case.solver.model_copy(update={"reuse": "across"})
         return case.solver
 
-    def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:
+    def _static(self, problem: ContactProblem, method: Method) -> Solution:
+        """Solve a static case from those before it, and from zero where that fails. Collective."""
         counted, ends = replace(method.counters), self._ends
-        start = predicted(problem, ends) if ends else None
-        state, outcome = solve_step(problem, method, start)
-        if start is not None and not outcome.converged and not outcome.signal:
-            state, outcome = solve_step(problem, method, None)
-        self._ends = [*ends[-1:], (problem, state)] if outcome.converged else []
-        check_potential(problem, state)
-        counters = method.counters - counted
-        return Solution(problem, state, outcome, [*method.history], counters, name, seconds={})
+        solution = solve_static(problem, method, predicted(problem, ends) if ends else None)
+        if ends and not solution.converged and not solution.outcome.signal:
+            solution = solve_static(problem, method)
+        self._ends = [*ends[-1:], (problem, solution.state)] if solution.converged else []
+        check_potential(problem, solution.state)
+        solution.counters = method.counters - counted
+        return solution
 
 
 def _alike(before: Case, case: Case) -> bool:

@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,7 @@ from contact.methods.signals import SIGNALLED, Terminated, signals_held
 from contact.ranks import on_root
 from contact.results.remarks import locks
 from contact.results.solution import Solution
-from contact.solving import SolveInterrupted, reviewed, solve, solve_problem, step_times
+from contact.solving import SolveInterrupted, reviewed, solve, solve_in_steps, solve_problem
 from contact.sweeping import TABLE, Axis, sweep
 from contact.writing import write_outputs
 
@@ -120,10 +121,8 @@ def solve_and_keep(
         kept = [] if restart is None else read_steps(restart, problem)
         here = restart is not None and restart.samefile(folder)
         keep = Checkpoints(folder, problem, case, kept, here).keep
-        solution = solve_problem(
-            problem, case.solver, monitor, times=step_times(case), kept=kept, keep=keep
-        )
-        return reviewed(solution, case, clock)
+        steps = partial(solve_in_steps, times=case.evolution.step_times, kept=kept, keep=keep)
+        return reviewed(solve_problem(problem, case.solver, monitor, steps), case, clock)
 
 
 def _results(solution: Solution) -> list[str]:

@@ -125,7 +125,7 @@ class Evolution(Described):
     @property
     def lost_peaks(self) -> list[str]:
         """The largest and the least values of amplitudes that no step meets, in words."""
-        steps, found = [self.times[0], *self.ends], []
+        steps, found = self.step_times, []
         for name, amplitude in self.amplitudes.items():
             times, values = map(np.array, amplitude.points)
             inside = (times > self.times[0]) & (times < self.times[-1])
@@ -147,3 +147,8 @@ class Evolution(Described):
             for (begin, end), count in zip(pairwise(self.times), self.steps, strict=True)
             for k in range(count)
         ]
+
+    @property
+    def step_times(self) -> list[float]:
+        """Begin of the first step, and ends of all."""
+        return [self.times[0], *self.ends]
