@@ -97,10 +97,10 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
     failures: list[Exception] = []
 
     def write(new: Path) -> Mapping[str, Any]:
-        opposite = opposite_surface(solution)
-        write_grid(comm, contact_surface(solution), new / SURFACE)
+        opposite = opposite_surface(solution.problem, solution.state)
+        write_grid(comm, contact_surface(solution.contact, solution.state), new / SURFACE)
         whole = None if opposite is None else gathered(comm, opposite)
-        table, records = contact_table(solution), solution.history
+        table, records = contact_table(solution.contact), solution.history
 
         def write_tables() -> None:
             write_columns(new / NODES, table)
@@ -139,7 +139,7 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
 def _write_contact_steps(solution: Solution, path: Path) -> None:
     """Write the contact nodes of all steps. Collective."""
     for k, record in enumerate(solution.steps):
-        table = contact_table(solution.at_step(record.state))
+        table = contact_table(solution.at_step(record.state).contact)
         table = {"t": np.full(len(table["x"]), record.state.time), **table}
         on_root(solution.problem.comm, partial(write_columns, path, table, more=k > 0))
 

@@ -103,7 +103,7 @@ def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> 
         derived.move_to(state)
         shares = {
             "fields": body_share(problem, state, names, derived),
-            "contact": contact_surface(solution.at_step(state)),
+            "contact": contact_surface(solution.at_step(state).contact, state),
         }
         for kind, share in shares.items():
             name = f"{kind}-{k:04d}.vtu"

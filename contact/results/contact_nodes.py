@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,10 @@ from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError, counted
 from contact.interface.mortar.lumping import JumpRows, Lumping
 from contact.interface.mortar.surface import surface_of
-from contact.interface.multipliers import Multipliers
 from contact.mesh.cells import Shape, shape_of
 from contact.mesh.entities import paths
 from contact.mesh.owners import Owners
@@ -57,83 +56,6 @@ class Grid:
     shape: Shape
     at_points: Mapping[str, Values]
     in_cells: Mapping[str, Values] = field(default_factory=dict)
-
-
-@dataclass(repr=False)
-class Solved:
-    """A solved problem.
-
-    Nodal quantities are those of the contact nodes that this rank owns, in the order of
-    `problem.nodes`.
-
-    Attributes
-    ----------
-    problem
-        The problem, of a load step that of its time and history.
-    state
-        Unknowns, contact forces, time and history: a value, which nothing that is done with the
-        problem changes.
-    """
-
-    problem: ContactProblem
-    state: State
-
-    @property
-    def nodal(self) -> Array:
-        """Jumps of displacement and scaled potential at the contact nodes, (n, block size)."""
-        return self.problem.nodal(self.state)
-
-    @property
-    def forces(self) -> Multipliers:
-        """Multipliers of the unilateral constraint and of friction."""
-        return self.state.forces
-
-    @property
-    def pressure(self) -> Array:
-        """Contact pressure -sigma_nu, shape (n,): multiplier and layer."""
-        return self.problem.interface.pressure(self.nodal, self.forces)
-
-    @property
-    def friction(self) -> Array:
-        """Friction stress -sigma_tau = lambda_f, shape (n, d)."""
-        return self.forces.friction
-
-    @property
-    def friction_bound(self) -> Array:
-        """Friction bound s, shape (n,). Collective."""
-        return self.problem.interface.bound(self.nodal, self.forces)
-
-    @property
-    def normal_displacement(self) -> Array:
-        """u_nu along the contact direction, shape (n,)."""
-        return self.problem.nodes.normal_component(self.nodal)
-
-    @property
-    def slip(self) -> Array:
-        """Tangential displacement u_tau, shape (n, d)."""
-        return self.problem.nodes.tangential_component(self.nodal)
-
-    @cached_property
-    def contact(self) -> ContactResult:
-        """The contact nodes of all ranks as arrays, and as functions. Collective."""
-        return contact_result(self)
-
-    @property
-    def status(self) -> NDArray[np.str_]:
-        """The active set by names: "open", "stick" or "slip", shape (n,). Collective.
-
-        A node is in contact where p - c (gap - u_nu) > 0 for the multiplier p, or where the
-        layer presses; c = E / size. There it slips if |lambda_f + c u_tau|
-        exceeds the friction bound (always where that is 0), and sticks else. Pressures
-        below 1e-9 of the largest count as rounding, and those that rounding of displacements makes.
-        """
-        interface, jump = self.problem.interface, self.nodal
-        rounding = interface.negligible(jump, self.pressure)
-        active = interface.active_set(jump, self.forces, self.friction_bound, rounding=rounding)
-        layer = interface.foundation.layer_pressure(jump) > rounding
-        touches = active.closed | layer
-        sticks = active.sticks & (self.friction_bound > 0)
-        return np.where(touches, np.where(sticks, "stick", "slip"), "open")
 
 
 def tangent_of(normal: Array) -> Array:
@@ -240,10 +162,13 @@ class ContactResult:
         return made
 
 
-def contact_result(solved: Solved) -> ContactResult:
-    """Return the contact nodes of a solved problem, those of all ranks. Collective."""
-    problem, nodes, forces = solved.problem, solved.problem.nodes, solved.forces
-    gap, normal_displacement = nodes.gap, solved.normal_displacement
+def contact_result(
+    problem: ContactProblem, state: State, status: NDArray[np.str_]
+) -> ContactResult:
+    """Return the contact nodes of all ranks, with the status of this rank's. Collective."""
+    nodes, jump, forces = problem.nodes, problem.nodal(state), state.forces
+    gap, normal_displacement = nodes.gap, nodes.normal_component(jump)
+    pressure = problem.interface.pressure(jump, forces)
     own: dict[str, NDArray[Any]] = {
         # Mesh generators leave coordinates such as -3e-19.
         "points": np.where(np.abs(nodes.points) < 1e-15 * problem.domain.size, 0.0, nodes.points),
@@ -252,18 +177,18 @@ def contact_result(solved: Solved) -> ContactResult:
         "gap": gap,
         "opening": gap - normal_displacement,
         "normal_displacement": normal_displacement,
-        "slip": solved.slip,
-        "pressure": solved.pressure,
+        "slip": nodes.tangential_component(jump),
+        "pressure": pressure,
         "friction": forces.friction,
-        "traction": solved.pressure[:, None] * nodes.normal + forces.friction,
-        "friction_bound": solved.friction_bound,
-        "status": solved.status,
+        "traction": pressure[:, None] * nodes.normal + forces.friction,
+        "friction_bound": problem.interface.bound(jump, forces),
+        "status": status,
         "entry": problem.entry_numbers,
         "node": problem.body.layout.index_map.local_to_global(nodes.nodes),
     }
     if problem.piezoelectric:
-        own["potential"] = problem.body.phi_scale * solved.nodal[:, -1]
-        own["charge"] = problem.interface.foundation.charge(solved.nodal, solved.pressure)
+        own["potential"] = problem.body.phi_scale * jump[:, -1]
+        own["charge"] = problem.interface.foundation.charge(jump, pressure)
     own = {name: nodes.gather(values) for name, values in own.items()}
     order = _by_position(problem, nodes.gather(nodes.points))
     if problem.dim == 2:
@@ -348,25 +273,25 @@ def contact_shares(
     return found
 
 
-def contact_table(solution: Solved) -> Table:
+def contact_table(contact: ContactResult) -> Table:
     """Return the columns of ``contact.csv``, the same on all ranks. Collective.
 
     In 2-D ``u_t`` and ``tau`` are the components of u_tau and lambda_f = -sigma_tau along
     `tangent_of` the contact direction; in 3-D they are vectors.
     """
-    return values_of(NODES, solution.contact)
+    return values_of(NODES, contact)
 
 
-def contact_surface(solution: Solved) -> Grid:
+def contact_surface(listed: ContactResult, state: State) -> Grid:
     """Return this rank's share of the contact part. Collective."""
-    problem, d = solution.problem, solution.problem.dim
-    body = problem.body
+    problem = listed._problem
+    body, d = problem.body, problem.dim
     owners = Owners.of(body.layout.index_map, problem.comm)
     parts = [surface_of(problem.domain, body.space, contact.on) for contact in problem.contacts]
     # A node of two contacts is one of each.
     nodes, cells = _numbered(owners, [part.nodes for part in parts])
     owner = np.repeat(np.arange(len(nodes)), [own.size for own in nodes]).astype(np.int32)
-    points, x = _at_nodes(solution, np.concatenate(nodes) - owners.begin)
+    points, x = _at_nodes(body, state, np.concatenate(nodes) - owners.begin)
     rigid = np.array([contact.against is None for contact in problem.contacts], dtype=np.int32)
     fields: dict[str, Values] = {
         "displacement": x[:, :d],
@@ -375,7 +300,7 @@ def contact_surface(solution: Solved) -> Grid:
     }
     if problem.piezoelectric:
         fields["potential"] = body.phi_scale * x[:, d]
-    listed, size = solution.contact, owners.begins[-1]
+    size = owners.begins[-1]
     known, numbers = owner * size + np.concatenate(nodes), listed.entry * size + listed.node
     for name, values in values_of(SURFACE, listed).items():
         fields[name] = _at(known, numbers, values)
@@ -399,10 +324,9 @@ def _numbered(
     return nodes, np.concatenate(cells)
 
 
-def _at_nodes(solution: Solved, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
+def _at_nodes(body: BodyEquilibrium, state: State, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return points and unknowns, (n, d) and (n, k), of nodes of this rank."""
-    body = solution.problem.body
-    return body.layout.points[nodes], body.nodal(solution.state.x)[nodes]
+    return body.layout.points[nodes], body.nodal(state.x)[nodes]
 
 
 def _at(known: NDArray[np.int64], numbers: NDArray[np.int64], values: Values) -> Values:
@@ -417,7 +341,7 @@ def _at(known: NDArray[np.int64], numbers: NDArray[np.int64], values: Values) ->
     return found
 
 
-def opposite_surface(solution: Solved) -> Grid | None:
+def opposite_surface(problem: ContactProblem, state: State) -> Grid | None:
     """Return this rank's share of the parts `against` with the stresses there. Collective.
 
     Multipliers live on the other side. Here the forces int N_l lambda act, which belong to nodes of
@@ -426,10 +350,10 @@ def opposite_surface(solution: Solved) -> Grid | None:
 
     None where all obstacles are rigid.
     """
-    problem, d = solution.problem, solution.problem.dim
-    body = problem.body
+    body, d = problem.body, problem.dim
     owners = Owners.of(body.layout.index_map, problem.comm)
-    stresses = np.column_stack([solution.pressure, solution.forces.vectors(problem.nodes)])
+    pressure = problem.interface.pressure(problem.nodal(state), state.forces)
+    stresses = np.column_stack([pressure, state.forces.vectors(problem.nodes)])
     ends = np.cumsum([own.nodes.nodes.size for own in problem.geometries])[:-1]
     sides, facets = [], []
     for i, own in enumerate(np.split(stresses, ends)):
@@ -439,7 +363,7 @@ def opposite_surface(solution: Solved) -> Grid | None:
         surface = surface_of(problem.domain, body.space, against)
         lumped = Lumping.of(surface)
         acting = _acting(owners, geometry.jumps, lumped, geometry.nodes.weight[:, None] * own)
-        points, x = _at_nodes(solution, lumped.nodes - owners.begin)
+        points, x = _at_nodes(body, state, lumped.nodes - owners.begin)
         sides.append(
             {
                 "points": points,

@@ -11,14 +11,21 @@ from typing import Any, Self, TypeAlias
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact.errors import InputError
+from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.report import Outcome, Record
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Balance, balance, dissipated
 from contact.problem.state import State
-from contact.results.contact_nodes import ContactShare, Solved, contact_shares
+from contact.results.contact_nodes import (
+    ContactResult,
+    ContactShare,
+    contact_result,
+    contact_shares,
+)
 from contact.results.error_estimate import Estimate, Intervals
 from contact.results.fields import Deformation, DerivedFields, unknowns
 from contact.results.functionals import MaxDisplacement
@@ -99,13 +106,19 @@ class StepRecorder:
 
 
 @dataclass(repr=False)
-class Solution(Solved):
+class Solution:
     """The solution of a problem, or the state at which its method has ended.
+
+    Nodal quantities are those of the contact nodes that this rank owns, in the order of
+    `problem.nodes`.
 
     Attributes
     ----------
-    problem, state
-        The problem, and its state: unknowns, contact forces, time and history.
+    problem
+        The problem, of a load step that of its time and history.
+    state
+        Unknowns, contact forces, time and history: a value, which nothing that is done with the
+        problem changes.
     outcome
         Whether it has converged, why it ended, and the residuals.
     history, counters
@@ -153,6 +166,8 @@ class Solution(Solved):
         The steps of an evolution, the last of which this is.
     """
 
+    problem: ContactProblem
+    state: State
     outcome: Outcome
     history: list[Record]
     counters: Counters
@@ -189,6 +204,63 @@ class Solution(Solved):
             f"<Solution{name}: {state}, {self.outcome.reason}; method {self.method}, "
             f"von Mises stress up to {self.max_von_mises:.4g}; {len(self.warnings)} warning(s)>"
         )
+
+    @property
+    def nodal(self) -> Array:
+        """Jumps of displacement and scaled potential at the contact nodes, (n, block size)."""
+        return self.problem.nodal(self.state)
+
+    @property
+    def forces(self) -> Multipliers:
+        """Multipliers of the unilateral constraint and of friction."""
+        return self.state.forces
+
+    @property
+    def pressure(self) -> Array:
+        """Contact pressure -sigma_nu, shape (n,): multiplier and layer."""
+        return self.problem.interface.pressure(self.nodal, self.forces)
+
+    @property
+    def friction(self) -> Array:
+        """Friction stress -sigma_tau = lambda_f, shape (n, d)."""
+        return self.forces.friction
+
+    @property
+    def friction_bound(self) -> Array:
+        """Friction bound s, shape (n,). Collective."""
+        return self.problem.interface.bound(self.nodal, self.forces)
+
+    @property
+    def normal_displacement(self) -> Array:
+        """u_nu along the contact direction, shape (n,)."""
+        return self.problem.nodes.normal_component(self.nodal)
+
+    @property
+    def slip(self) -> Array:
+        """Tangential displacement u_tau, shape (n, d)."""
+        return self.problem.nodes.tangential_component(self.nodal)
+
+    @cached_property
+    def contact(self) -> ContactResult:
+        """The contact nodes of all ranks as arrays, and as functions. Collective."""
+        return contact_result(self.problem, self.state, self.status)
+
+    @property
+    def status(self) -> NDArray[np.str_]:
+        """The active set by names: "open", "stick" or "slip", shape (n,). Collective.
+
+        A node is in contact where p - c (gap - u_nu) > 0 for the multiplier p, or where the
+        layer presses; c = E / size. There it slips if |lambda_f + c u_tau|
+        exceeds the friction bound (always where that is 0), and sticks else. Pressures
+        below 1e-9 of the largest count as rounding, and those that rounding of displacements makes.
+        """
+        interface, jump = self.problem.interface, self.nodal
+        rounding = interface.negligible(jump, self.pressure)
+        active = interface.active_set(jump, self.forces, self.friction_bound, rounding=rounding)
+        layer = interface.foundation.layer_pressure(jump) > rounding
+        touches = active.closed | layer
+        sticks = active.sticks & (self.friction_bound > 0)
+        return np.where(touches, np.where(sticks, "stick", "slip"), "open")
 
     @property
     def converged(self) -> bool:

@@ -71,7 +71,7 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
             solution.outcome.residuals.largest,
             uzawa.outcome.residuals.largest,
         )
-        solutions[label], tables[label] = solution, contact_table(solution)
+        solutions[label], tables[label] = solution, contact_table(solution.contact)
     name = f"nonlocal-{abs(load):g}".replace(".", "_")
     where = f"Example 7.2, f2 = {load:g}, rho = {RHO:g}, {4 * n} x {n} cells"
     report.table(

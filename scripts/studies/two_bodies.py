@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def table_of(solution: Solution) -> Table:
     """Return the contact table."""
-    table = contact_table(solution)
+    table = contact_table(solution.contact)
     assert table is not None  # on one rank
     return table
 

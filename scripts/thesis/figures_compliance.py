@@ -129,7 +129,7 @@ def example(
 ) -> None:
     """Draw both parts of Figure 8.9 or 8.10, or of a variant of it. Collective."""
     solution = solution_of(name, cells, *changes)
-    run, table, share = run_of(solution), contact_table(solution), solution.plastic_share
+    run, table, share = run_of(solution), contact_table(solution.contact), solution.plastic_share
     if run is None:
         return
     deformed = picture(run, "potential")
@@ -206,9 +206,9 @@ def series(report: Report, cells: tuple[int, int], values: Mapping[float, str] =
     for value in values:
         changes = f"friction.mu={value}", f"electric.k_e={value}"
         solution = solution_of("compliance-8-4", cells, *changes, domain=domain)
-        tables[f"mu = k_e = {value:g}"] = contact_table(solution)
+        tables[f"mu = k_e = {value:g}"] = contact_table(solution.contact)
     # Last, to lie on top of the curves that tend to it.
-    tables["Problem (PV1)"] = contact_table(limit)
+    tables["Problem (PV1)"] = contact_table(limit.contact)
     names = [*(rf"$\mu = k_e = {words}$" for words in values.values()), "Problem (PV1)"]
     if MPI.COMM_WORLD.rank > 0:
         return

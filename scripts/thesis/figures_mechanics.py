@@ -44,7 +44,7 @@ FIGURES: Mapping[str, tuple[float, tuple[str, ...], str]] = {
 def draw(report: Report, number: str, case: Case, text: str, load: float) -> Table | None:
     """Draw both parts of a figure; return the contact table on rank 0. Collective."""
     solution = solved(case)
-    run, table = run_of(solution), contact_table(solution)
+    run, table = run_of(solution), contact_table(solution.contact)
     if run is None:
         return None
     deformed = picture(run, "von_mises")

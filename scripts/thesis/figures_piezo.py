@@ -81,7 +81,7 @@ def potentials(
         solution = solution_of(name, cells, *curve.changes, domain=domain)
         domain = solution.problem.domain
         residual = max(residual, solution.outcome.residuals.largest)
-        table = contact_table(solution)
+        table = contact_table(solution.contact)
         if table is not None:
             data.setdefault("x", table["x"])
             data[curve.label] = table["phi"]

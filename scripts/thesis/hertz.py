@@ -254,7 +254,7 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
         "(7.16), rho = 1e4": (1600.0, "(7.16)", "foundation", "quarter_disc"),
         "(7.16), body's normal": (1600.0, "(7.16)", "body", "quarter_disc"),
     }
-    tables = {label: contact_table(solutions[key]) for label, key in shown.items()}
+    tables = {label: contact_table(solutions[key].contact) for label, key in shown.items()}
     run = run_of(solutions[shown["(7.16), rho = 1e4"]])
     if run is None:
         return

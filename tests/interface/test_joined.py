@@ -62,7 +62,7 @@ def test_one_law_for_two_feet_is_the_law_of_their_union(common) -> None:
     two = solve(case(apart))
     assert one.converged and two.converged
     np.testing.assert_allclose(displacements(two), displacements(one), rtol=0, atol=1e-11)
-    tables = [contact_table(solution) for solution in (one, two)]
+    tables = [contact_table(solution.contact) for solution in (one, two)]
     if tables[0] is None or tables[1] is None:
         return
     assert next(iter(tables[1])) == "on" and "on" not in tables[0]
@@ -82,7 +82,7 @@ def test_each_foot_has_its_own_law(method: str) -> None:
     ]
     solution = solve(case(contact, solver={"method": method, "tolerance": 1e-9}))
     assert solution.converged
-    table = contact_table(solution)
+    table = contact_table(solution.contact)
     if table is None:
         return
     first, second = table["on"] == "one", table["on"] == "two"
@@ -116,7 +116,7 @@ def test_two_electrodes_under_one_body() -> None:
     contact = [{"on": name, "electric": law} for name, law in pairs]
     solution = solve(case(contact, material={"piezo": piezo}, solver={}))
     assert solution.converged
-    table = contact_table(solution)
+    table = contact_table(solution.contact)
     assert table is not None
     charge = [np.sum((table["weight"] * table["d_n"])[table["on"] == name]) for name in PIECES]
     assert charge[0] < 0 and charge[0] == pytest.approx(-charge[1], rel=1e-9)

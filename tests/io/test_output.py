@@ -87,8 +87,8 @@ def test_raw_residuals_are_written_beside_their_floors(method: str, tmp_path: Pa
 @pytest.mark.parametrize("dim", [2, 3])
 def test_same_on_any_number_of_ranks(dim: int, shared_tmp_path: Path) -> None:
     """The table of all ranks is that of one, row by row."""
-    together = contact_table(solve(block(dim), comm=MPI.COMM_WORLD))
-    alone = contact_table(solve(block(dim), comm=MPI.COMM_SELF))
+    together = contact_table(solve(block(dim), comm=MPI.COMM_WORLD).contact)
+    alone = contact_table(solve(block(dim), comm=MPI.COMM_SELF).contact)
     assert alone is not None
     if together is None:
         return
@@ -113,7 +113,7 @@ def test_rows_follow_the_contact_part(shared_tmp_path: Path) -> None:
             "foundation": {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]},
         },
     )
-    table = contact_table(solve(disc))
+    table = contact_table(solve(disc).contact)
     assert table is not None
     points = np.column_stack([table["x"], table["y"]])
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -128,7 +128,7 @@ def test_rows_follow_the_contact_part(shared_tmp_path: Path) -> None:
         contact={"on": "two"},
         mesh={"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4], "parts": parts},
     )
-    table = contact_table(solve(pieces))
+    table = contact_table(solve(pieces).contact)
     assert table is not None
     np.testing.assert_allclose(table["x"], [*np.arange(5) / 8, *(1.5 + np.arange(5) / 8)])
 

@@ -218,7 +218,7 @@ def test_two_pairs_have_two_laws():
     }
     solution = solve(parse_case(given))
     assert solution.converged
-    table = contact_table(solution)
+    table = contact_table(solution.contact)
     below, above = table["on"] == "ball_bottom", table["on"] == "ball_top"
     upwards = table["weight"] * table["pressure"] * solution.contact.normal[:, 1]
     force = [upwards[below].sum(), upwards[above].sum()]

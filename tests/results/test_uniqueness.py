@@ -302,7 +302,7 @@ def test_a_constant_pressure_is_constant_on_both_sides(dim: int, degree: int) ->
     problem = ContactProblem(domain, body, Contact("under", gap, against="over"), degree=degree)
     # The upper block can move as a rigid body, which `solve` would refuse.
     found = solve_problem(problem, NewtonOptions(tolerance=1e-13))
-    surface = opposite_surface(found)
+    surface = opposite_surface(problem, found.state)
     assert surface is not None
     fields = surface.at_points
     away = [

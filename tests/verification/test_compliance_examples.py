@@ -209,7 +209,7 @@ def test_ranks_agree(name):
 
     def quantities(solution):
         assert solution.converged, solution.outcome
-        table = contact_table(solution)
+        table = contact_table(solution.contact)
         names = ("x", "u_n", "u_t", "pressure", "tau", "phi", "d_n", "status")
         return {name: np.asarray(table[name]) for name in names}
 

@@ -60,7 +60,7 @@ def test_no_node_is_in_the_ball():
     pressed = problem.nodes.points[solution.pressure > 1e-6]
     vertices = np.abs(pressed[:, :2] * 4 - np.round(pressed[:, :2] * 4)).max(axis=1) < 1e-9
     assert 5 <= np.count_nonzero(vertices) < len(pressed)
-    table = contact_table(solution)
+    table = contact_table(solution.contact)
     assert table is not None
     assert table["x"].size == np.count_nonzero(top)
 
