@@ -23,7 +23,8 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
 from contact.mesh import grid
-from contact.mesh.domain import Domain, Indices
+from contact.mesh.domain import Domain
+from contact.mesh.entities import Indices
 from contact.mesh.transfer import carry, with_parents
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions

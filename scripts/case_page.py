@@ -16,8 +16,9 @@ from pydantic.fields import FieldInfo
 
 import meshes
 from contact.case.file import DEFAULT, Case, literal
+from contact.errors import shown
 from contact.model import formula as formulas
-from contact.model.messages import accepted_by, either, keys_of, kinds_of, sections_of, shown
+from contact.model.messages import accepted_by, either, keys_of, kinds_of, sections_of
 from contact.settings import ReadWith
 
 PAGE = Path(__file__).parents[1] / "docs" / "case-file.md"

@@ -24,7 +24,8 @@ from contact.body.elements import Pointwise
 from contact.errors import InputError
 from contact.history import QUADRATURE_POINTS, InternalVariables, LinearisationPoint
 from contact.mesh.cells import shape_of
-from contact.mesh.domain import Domain, Indices
+from contact.mesh.domain import Domain
+from contact.mesh.entities import Indices
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.model.material import Material
 from contact.ranks import collective, on_all_ranks

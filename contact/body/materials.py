@@ -17,8 +17,8 @@ from contact.body.elements import CHUNK, Rule
 from contact.body.internal_variables import QuadratureLaws
 from contact.body.weak_form import Solid
 from contact.errors import InputError
-from contact.mesh.domain import Domain, Indices
-from contact.mesh.entities import cells_at
+from contact.mesh.domain import Domain
+from contact.mesh.entities import Indices, cells_at
 from contact.mesh.geometry import geometry_nodes
 from contact.model.fields import constant, values_at
 from contact.model.material import Material

@@ -12,10 +12,9 @@ from typing import Any
 from urllib.parse import quote
 
 from contact.case.file import Case
-from contact.errors import InputError
+from contact.errors import InputError, shown
 from contact.library.materials import PACKAGED
 from contact.mesh.reader import mesh_files
-from contact.model.messages import shown
 from contact.model.section import FilePath, walk
 
 #: Key of the mesh file.

@@ -29,7 +29,7 @@ from pydantic import (
 
 from contact.case.checks import check_mesh, check_sections
 from contact.case.mesh import Adapt, Mesh, cut_about_axis
-from contact.errors import InputError, clipped
+from contact.errors import InputError, clipped, shown
 from contact.methods.options import OPTIONS, NewtonOptions, Options
 from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
 from contact.model.contact import Contact
@@ -38,7 +38,7 @@ from contact.model.fields import CONSTANT, Factor, Ramp, steady
 from contact.model.foundation import Electric
 from contact.model.friction import Friction
 from contact.model.material import Material
-from contact.model.messages import describe, either, shown
+from contact.model.messages import describe, either
 from contact.model.rigid import Rigid
 from contact.model.section import OneOrSome, Section, Text, as_tuple, walk
 from contact.model.units import NAMES, SYSTEMS, labels_of

@@ -18,8 +18,8 @@ from contact.case.file import Case, load_case, to_toml
 from contact.cli.main import CONVERGED
 from contact.errors import counted
 from contact.mesh.cells import Shape, rule, shape_of
-from contact.mesh.domain import Domain, Indices
-from contact.mesh.entities import cells_at
+from contact.mesh.domain import Domain
+from contact.mesh.entities import Indices, cells_at
 from contact.mesh.geometry import (
     determinant,
     geometry_nodes,

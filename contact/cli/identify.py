@@ -16,10 +16,10 @@ from contact.cli.main import CONVERGED
 from contact.cli.progress import progress
 from contact.derivatives.identification import TIME, Identified, identify
 from contact.errors import InputError
-from contact.io.folder import on_root
 from contact.model.data import read_data
 from contact.plot.figures import FORMATS
 from contact.plot.style import BLUE, GREY, ORANGE, STYLE, sheet
+from contact.ranks import on_root
 from contact.typing import Array
 
 

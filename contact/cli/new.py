@@ -17,8 +17,8 @@ from contact.case.file import literal
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.interface.pairing import REACH
-from contact.mesh.domain import ON_AXIS, Domain, Indices
-from contact.mesh.entities import distributed_components
+from contact.mesh.domain import ON_AXIS, Domain
+from contact.mesh.entities import Indices, distributed_components
 from contact.mesh.geometry import facet_normals, geometry_nodes
 from contact.mesh.reader import convert, from_file
 from contact.ranks import on_root

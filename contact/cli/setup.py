@@ -16,8 +16,8 @@ from scipy.spatial import KDTree
 
 from contact.case.file import Case
 from contact.mesh.cells import facet_of, shape_of
-from contact.mesh.domain import Domain, Indices
-from contact.mesh.entities import exterior_facets
+from contact.mesh.domain import Domain
+from contact.mesh.entities import Indices, exterior_facets
 from contact.mesh.geometry import area, geometry_nodes, normals_at
 from contact.model.fields import at_time, knows_time
 from contact.plot.foundation import BEYOND, HATCHED, add_foundation, facing

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from contact import _compat
 from contact.mesh.cells import Shape, barycentric, rule, shape_of
-from contact.mesh.domain import Domain, Indices
-from contact.mesh.entities import cells_at
+from contact.mesh.domain import Domain
+from contact.mesh.entities import Indices, cells_at
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 

@@ -11,7 +11,8 @@ from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
 from contact.errors import InputError, shown
-from contact.mesh.domain import Domain, exterior_facets, with_names
+from contact.mesh.domain import Domain, with_names
+from contact.mesh.entities import exterior_facets
 
 
 def rotate(mesh: dmesh.Mesh, degrees: float, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> None:

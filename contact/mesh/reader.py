@@ -26,8 +26,8 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.mesh.abaqus import included_files, read_abaqus
 from contact.mesh.contents import Cells, Contents, Groups, check
-from contact.mesh.domain import Domain, Indices, exterior_facets, with_names
-from contact.mesh.entities import combinations, labels_of
+from contact.mesh.domain import Domain, with_names
+from contact.mesh.entities import Indices, combinations, exterior_facets, labels_of
 from contact.mesh.formats import (
     array_files,
     model_contents,

@@ -21,8 +21,8 @@ from contact._compat import lasting
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import deviations
-from contact.mesh.domain import Domain, exterior_facets
-from contact.mesh.entities import Indices, cell_facets, cells_at, extent, sums_at
+from contact.mesh.domain import Domain
+from contact.mesh.entities import Indices, cell_facets, cells_at, extent, exterior_facets, sums_at
 from contact.mesh.geometry import determinant, jacobians, unit_normals
 from contact.mesh.owners import Owners
 from contact.typing import Array

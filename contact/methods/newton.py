@@ -34,7 +34,6 @@ from contact.linear.operator import Counters
 from contact.methods.fallbacks import (
     CONTINUATION,
     PROXIMAL_POINT,
-    RIGID_MOTION,
     SECANT,
     WORKING_SET,
     solve_condensed_first,
@@ -45,7 +44,7 @@ from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Monitor, Outcome, Record, Recorder
 from contact.methods.semismooth import ConvergenceMonitor, SemismoothNewton
-from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.methods.unconstrained_modes import RIGID_MOTION, UnconstrainedModes
 from contact.problem.condensed import (
     AnyProblem,
     Condensation,

@@ -12,13 +12,14 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from contact.arguments import expect, one_of
+from contact.errors import shown
 from contact.mesh.domain import Domain, meet
 from contact.model.body import ZERO
 from contact.model.fields import Static
 from contact.model.formula import Expression
 from contact.model.foundation import Conductor, Electric, Layer
 from contact.model.friction import Friction
-from contact.model.messages import either, shown
+from contact.model.messages import either
 from contact.model.obstacle import SHAPES, GapFunction, Obstacle, Shape
 from contact.model.rigid import Motion
 from contact.model.section import Described, Direction, Part, StaticValue

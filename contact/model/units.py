@@ -9,7 +9,8 @@ from typing import Annotated, Any, TypeAlias
 from annotated_types import Predicate
 from pydantic import Tag, WithJsonSchema
 
-from contact.model.messages import either, shown
+from contact.errors import shown
+from contact.model.messages import either
 from contact.model.section import Section, by_kind
 from contact.settings import Accepted
 

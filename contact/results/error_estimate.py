@@ -34,8 +34,8 @@ from contact import _compat
 from contact.body.elements import MEAN_DILATATION, in_chunks
 from contact.body.materials import factor_of
 from contact.mesh.cells import rule, shape_of
-from contact.mesh.domain import Domain, Indices, members, part_name
-from contact.mesh.entities import accumulated, cell_facets, cells_at, sums_at, with_ghosts
+from contact.mesh.domain import Domain, members, part_name
+from contact.mesh.entities import Indices, accumulated, cell_facets, cells_at, sums_at, with_ghosts
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.mesh.owners import Owners
 from contact.model.body import Bolt

@@ -28,8 +28,7 @@ from scipy.sparse import csr_array
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.cells import INTERVAL, Shape, barycentric, rule, shape_of
-from contact.mesh.domain import Indices
-from contact.mesh.entities import accumulated, cell_facets, with_ghosts
+from contact.mesh.entities import Indices, accumulated, cell_facets, with_ghosts
 from contact.mesh.geometry import geometry_nodes, integration_weights, inverse, jacobians
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -35,9 +35,9 @@ from typing import ClassVar
 import numpy as np
 
 from contact.linear.operator import Counters, Operator
-from contact.methods.newton_step import ConductivityDerivative
 from contact.methods.options import FixedPointOptions, LoopOptions
 from contact.methods.report import Best, Monitor, Outcome, Record, Recorder, Stagnation
+from contact.methods.safeguards import ConductivityDerivative
 from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads, sum_of_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import (

@@ -10,6 +10,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from forms.crystal import (
+    VOIGT,
     about_z,
     in_plane,
     isotropic_about_x3,
@@ -21,7 +22,6 @@ from forms.crystal import (
 from forms.elasticity import Anisotropic, hexagonal, isotropic
 from forms.hencky import Linear, energy_density, stress
 from forms.piezo import (
-    VOIGT,
     Piezo,
     coupling_number,
     coupling_stress,

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from contact import write_outputs
 from contact.body.description import Body
+from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
@@ -26,7 +27,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
 from contact.results.resultants import movements
-from contact.solving import build_problem, solve
+from contact.solving import solve
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks

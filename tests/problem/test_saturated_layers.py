@@ -8,11 +8,12 @@ import pytest
 from mpi4py import MPI
 
 from contact import Body, Contact, Fixed, Layer, Linear, Load, Problem
+from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.methods import fallbacks
 from contact.problem.checks import check_rigid_modes
-from contact.solving import build_problem, solve
+from contact.solving import solve
 from forms.laws import PotentialFactor
 
 SELF = MPI.COMM_SELF
