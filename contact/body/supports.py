@@ -89,11 +89,10 @@ def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Su
             raise InputError(
                 f"fixed on {fixed.on!r}: a potential needs a piezoelectric material", "piezo"
             )
-        for key, value in fixed.given.items():
-            if key == "normal":
-                continue
-            component = dim if key == "potential" else int(key[-1])
+        electric = {} if fixed.potential is None else {dim: fixed.potential}
+        for component, value in (fixed.components | electric).items():
             scale = body.phi_scale if component == dim else 1.0
+            key = "potential" if component == dim else f"displacement.{component}"
             name = f"fixed.{number}.{key}"
             supports.append(
                 _support(domain, space, component, fixed.on, value, scale, fixed.factor, name)
