@@ -499,12 +499,16 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
     elif problem.body.degree == 2 and problem.domain.levels == 0:
         yield from _straight_edges(solution, closed)
     else:
-        size = nodes.maximum(np.where(closed, np.abs(problem.interface.gap), 0.0))
-        if size > 1e-9 * problem.domain.size and uncertainty > DEVIATION * size:
-            yield (
-                f"straight facets deviate by up to {uncertainty:.3g} from a curved contact "
-                f"surface, and contact closes gaps of at most {size:.3g}; accepted: {FINER}"
-            )
+        for number, contact in enumerate(problem.contacts):
+            own = problem.entry_numbers == number
+            size = nodes.maximum(np.where(own & closed, np.abs(problem.interface.gap), 0.0))
+            off = nodes.maximum(np.where(own, nodes.deviation, 0.0))
+            if size > 1e-9 * problem.domain.size and off > DEVIATION * size:
+                yield (
+                    f"straight facets deviate by up to {off:.3g} from a curved contact surface, "
+                    f"and contact of {contact.on} closes gaps of at most {size:.3g}; "
+                    f"accepted: {FINER}"
+                )
 
 
 def _straight_edges(solution: Solution, closed: NDArray[np.bool_]) -> Iterator[Remark]:

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from contact import Body, Contact, Fixed, Linear, Plane, Problem, Sphere, parse_case, solve
 from contact.mesh.grid import rectangle
 from scripts.studies import curved_foundations as study
+from tests.problems.overlapping import body, layers
 
 COMM = MPI.COMM_WORLD
 
@@ -146,6 +147,18 @@ def test_two_rings_with_a_small_interference(degree):
     else:
         assert "by up to 0.000803 " in found[0]
         assert "at most 0.000773" in found[0]
+
+
+@pytest.mark.parallel
+def test_a_small_interference_beside_a_large_one():
+    """Chords decide the gaps of the first pair alone."""
+    radii, counts = (1.0, 1.5, 2.0, 2.5), (16, 20, 16)
+    domain = layers(COMM, "quadrilateral", 1, "ring", (0.003, 0.1), radii, counts)
+    pairs = [Contact(f"outer{k}", against=f"inner{k + 1}", press=True) for k in range(2)]
+    solution = solve(Problem(domain, body("ring", 2, 3), pairs))
+    assert solution.converged
+    (text,) = warnings(solution)
+    assert "contact of outer0 closes gaps of at most 0.00" in text
 
 
 def test_two_rings_are_right_however_small_their_interference():
