@@ -63,8 +63,8 @@ __all__ = ["__version__", *_PUBLIC]
 os.environ.setdefault("OMPI_MCA_topo", "basic")
 
 # The wheels of dolfinx and PETSc do not find the library of MPI by themselves, but take the one
-# that mpi4py has loaded.
-with suppress(ImportError):
+# that mpi4py has loaded. One of pip without a library of MPI raises a RuntimeError.
+with suppress(ImportError, RuntimeError):
     import_module("mpi4py.MPI")
 
 

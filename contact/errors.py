@@ -106,8 +106,10 @@ def installed() -> Iterator[None]:
         if name not in OF_EXTRAS:
             raise
         text = f"the Python module {name} is needed; accepted: {WAYS}"
-        raise InputError(text, "fenicsx") from error
+        raise InputError(text, "fenicsx") from None
     except Exception as error:
+        if "MPI library" in str(error):
+            raise InputError(f"mpi4py finds none ({error}); accepted: {WAYS}", "fenicsx") from None
         # cffi's, and dolfinx's on several ranks.
         of_ranks = re.search("(JIT|just-in-time) compilation", str(error))
         if not of_ranks and type(error).__name__ != "VerificationError":

@@ -18,6 +18,7 @@ from contact.methods.signals import signals_held
 from contact.plot.figures import FORMATS, export, plot, window
 from contact.plot.run import read_run
 from contact.plot.series import plot_sweep
+from contact.plot.space import has_display
 from contact.plot.style import Look
 from contact.ranks import on_root
 from contact.sweeping import TABLE
@@ -67,7 +68,7 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 def show(folder: Path, field: str | None) -> None:
     """Show the body of a run in 3-D in a window, until that is closed."""
     opened = window(read_run(folder), field)
-    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    display = os.environ.get("WAYLAND_DISPLAY") or has_display()
     if pyvista.OFF_SCREEN or (sys.platform == "linux" and not display):
         opened.close()
         raise InputError(

@@ -115,6 +115,7 @@ def export(folder: Path, fields: Sequence[str] = ()) -> list[Path]:
 
     def draw(new: Path) -> list[Path]:
         run, files = read_run(folder), []
+        drawable()  # even a page takes a display of VTK before 9.4
         for field in fields or (None,):
             files.append(new / f"figure-view{f'-{field}' if field else ''}.html")
             try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import logging
 import os
 from collections.abc import Callable, Mapping
@@ -27,9 +28,6 @@ from contact.results.quantity import STATUS
 from contact.typing import Array
 
 logger = logging.getLogger("contact.plots")
-
-if not os.environ.get("DISPLAY"):  # VTK would warn of it, and draws all the same
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
 
 #: Cosine from which on a normal counts as that of a coordinate plane.
 SNAPPED = 0.966
@@ -88,9 +86,25 @@ class Camera:
         plotter.renderer.ResetCameraClippingRange()
 
 
+def has_display() -> bool:
+    """Return whether the X server of DISPLAY answers; of a session that has ended it does not."""
+    try:
+        xlib = ctypes.CDLL("libX11.so.6")
+    except OSError:  # macOS, or without X11
+        return bool(os.environ.get("DISPLAY"))
+    xlib.XOpenDisplay.restype = ctypes.c_void_p
+    display = xlib.XOpenDisplay(None)
+    if display:
+        xlib.XCloseDisplay(ctypes.c_void_p(display))
+    return bool(display)
+
+
 def drawable() -> bool:
     """Return whether scenes can be rendered here; warn if not."""
-    if not os.environ.get("DISPLAY") and pyvista.vtk_version_info < (9, 4):
+    if has_display():
+        return True
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # VTK would warn of it, and draws
+    if pyvista.vtk_version_info < (9, 4):  # aborts without a display
         try:
             pyvista.start_xvfb()
         except OSError:

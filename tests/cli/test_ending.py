@@ -96,6 +96,35 @@ def test_no_library_says_a_word(case: str, changes: list[str], ranks: int, tmp_p
     assert [line for line in text.splitlines() if not line.startswith("warning: ")] == []
 
 
+def test_a_display_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of an ended session: VTK before 9.4 would abort the program."""
+    monkeypatch.setenv("DISPLAY", ":77")
+    given = [str(CASES / "press-shear-unload.toml"), "--set=mesh.cells=[2, 2, 2]"]
+    given += ["--set=evolution.steps=[1, 1, 1]", "--out", str(tmp_path / "out"), "--quiet"]
+    status, text = run("solve", *given, "--plot")
+    assert status == 0
+    assert [line for line in text.splitlines() if not line.startswith("warning: ")] == []
+    assert [*(tmp_path / "out").glob("figure-contact*")]
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        "sys.modules['mpi4py'] = None",
+        # that of pip where no library of MPI is found
+        "import types\nclass Raising(types.ModuleType):\n"
+        "    def __getattr__(self, name): raise RuntimeError('cannot load MPI library')\n"
+        "sys.modules['mpi4py'] = Raising('mpi4py')",
+    ],
+)
+def test_without_mpi_python_has_one_message(before: str) -> None:
+    program = f"import sys\n{before}\nfrom contact import load_case, solve"
+    found = subprocess.run([sys.executable, "-c", program], stderr=subprocess.PIPE, text=True)
+    assert found.returncode == 1 and found.stderr.count("Traceback") == 1
+    last = found.stderr.splitlines()[-1]
+    assert "InputError" in last and "pip install" in last and last.endswith("[fenicsx]")
+
+
 def test_names_of_the_package_come_in_any_order() -> None:
     """The wheels' dolfinx needs the library of MPI that mpi4py loads."""
     program = "from contact import load_case, solve"
