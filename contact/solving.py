@@ -321,7 +321,7 @@ def solve_problem(
     solved = time.perf_counter() - clock - setup
     solution.seconds = {"setup": setup, "solve": solved, "output": 0.0}
     here, state = solution.problem, solution.state
-    body = method.condensation if isinstance(method, Newton) else None
+    body = method.condensed_steps.condensation if isinstance(method, Newton) else None
     if solution.converged:
         solution.critical_factor, solution.jammed = uniqueness(here, state, body)
     # The review needs the memory that the method's operators take.

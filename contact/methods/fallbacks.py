@@ -1,7 +1,6 @@
-"""The strategy: stages of the semismooth Newton method, and its fallbacks.
+"""The semismooth Newton method with its fallbacks, on one problem.
 
-1. Steps on the condensed body where that pays, then on the whole one (`solve_condensed_first`);
-   else on the whole one alone (`solve_contact`).
+1. Newton's steps on one problem, the whole or the condensed one (`solve_contact`).
 2. Fallbacks, where these end without convergence, in turn (`fall_back`):
 
    - all nodes open, by one linear solve from the best iterate, then a working set from there;
@@ -11,13 +10,12 @@
    - a rigid motion that separates the bodies, of a condensed problem alone;
    - proximal points, from that guess;
    - the interior point from that guess, its first slacks from the gaps of the linear solve;
-   - steps on the condensed body, of a whole problem alone, from that guess.
+   - steps on the condensed body, of a whole problem that does not begin with them, from that guess.
 
 3. The iterate of least residual.
 
-A condensed problem has fallbacks of its own, all but the last. The notes of the history name them.
-They are also tried where Newton's method has converged to a solution at which a rigid-body
-mode has become unconstrained, although friction could constrain it.
+The notes of the history name them. They are also tried where Newton's method has converged to a
+solution at which a rigid-body mode has become unconstrained, although friction could constrain it.
 
 References
 ----------
@@ -36,7 +34,6 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +42,7 @@ from contact.errors import SingularError
 from contact.interface.interface import Interface, Proximal
 from contact.methods.interior_point import interior_point
 from contact.methods.report import PROGRESS, Outcome
-from contact.methods.semismooth import SemismoothNewton
+from contact.methods.semismooth import End, SemismoothNewton
 from contact.methods.unconstrained_modes import RIGID_MOTION
 from contact.problem.condensed import CondensedProblem
 from contact.problem.residuals import evaluate, residual_forces
@@ -53,10 +50,6 @@ from contact.problem.state import State
 from contact.ranks import summed
 
 logger = logging.getLogger("contact.solver")
-
-#: Last iterate and outcome of a stage, and a stage from an initial guess.
-End: TypeAlias = tuple[State, Outcome]
-Stage: TypeAlias = Callable[[State], End]
 
 #: Notes of steps in the history.
 WORKING_SET, CONTINUATION, PROXIMAL_POINT = "working set", "continuation", "proximal point"
@@ -86,57 +79,41 @@ NEARER, STAGNANT_PROBLEMS = 0.9, 16
 NEARLY_BALANCED = 0.03
 
 
-def solve_contact(
-    semismooth: SemismoothNewton, begin: State, condensed_steps: Stage | None = None
-) -> End:
-    """Solve one problem by Newton's steps, then by its fallbacks. Collective.
-
-    Steps on the condensed body are the last fallback of a whole problem that can be condensed.
-    """
+def solve_contact(semismooth: SemismoothNewton, begin: State) -> End:
+    """Solve one problem by Newton's steps, then by its fallbacks. Collective."""
     state, outcome = semismooth.iterate(begin, give_up=True)
     if outcome.converged and semismooth.modes.unconstrained_at(semismooth.problem, state):
-        end = fall_back(semismooth, state, outcome, condensed_steps)
+        end = fall_back(semismooth, state, outcome)
         return end if end[1].converged else (state, outcome)
-    if outcome.final:
-        return state, outcome
-    return fall_back(semismooth, state, outcome, condensed_steps)
-
-
-def solve_condensed_first(
-    semismooth: SemismoothNewton, begin: State, condensed_steps: Stage
-) -> End:
-    """Solve by steps on the condensed body, then on the whole one, then by fallbacks. Collective.
-
-    Each step on the condensed body solves its contact problem by `solve_contact`.
-    """
-    state, outcome = condensed_steps(begin)
-    if not outcome.final and semismooth.steps_left > 0:
-        logger.info("%s; going on with the whole body", outcome.ended)
-        state, outcome = semismooth.iterate(state)
     return (state, outcome) if outcome.final else fall_back(semismooth, state, outcome)
 
 
-def fall_back(
-    semismooth: SemismoothNewton,
-    state: State,
-    outcome: Outcome,
-    condensed_steps: Stage | None = None,
-) -> End:
+def fall_back(semismooth: SemismoothNewton, state: State, outcome: Outcome) -> End:
     """Try the fallbacks in turn until one converges; else return the best iterate. Collective."""
     logger.info(
         "%s; going on with fallbacks", outcome.ended or "a rigid-body mode is unconstrained"
     )
-    singular = None
+    singular, problem = None, semismooth.problem
     without_contact = all_open(semismooth)
-    for fallback in (
-        partial(working_set, semismooth, without_contact),
-        partial(conductivity_continuation, semismooth),
-        partial(layer_secants, semismooth),
-        partial(rigid_motion, semismooth, outcome),
-        partial(proximal_points, semismooth),
-        partial(interior_points, semismooth, without_contact, condensed_steps is not None),
-        partial(on_condensed_body, semismooth, condensed_steps),
-    ):
+    fallbacks: tuple[Callable[[], End | None], ...]
+    if isinstance(problem, CondensedProblem):
+        fallbacks = (
+            partial(working_set, semismooth, without_contact),
+            partial(conductivity_continuation, semismooth),
+            partial(layer_secants, semismooth),
+            partial(rigid_motion, semismooth, problem, outcome),
+            partial(proximal_points, semismooth),
+            partial(interior_points, semismooth, without_contact),
+        )
+    else:
+        fallbacks = (
+            partial(working_set, semismooth, without_contact),
+            partial(layer_secants, semismooth),
+            partial(proximal_points, semismooth),
+            partial(interior_points, semismooth, without_contact),
+            partial(on_condensed_body, semismooth),
+        )
+    for fallback in fallbacks:
         try:
             end = fallback()
         except SingularError as error:
@@ -147,12 +124,12 @@ def fall_back(
             if outcome.final:
                 return end
     # A nonlinear material may be singular at the strains of a step alone.
-    if singular is not None and semismooth.problem.body.linear and not outcome.converged:
+    if singular is not None and problem.body.linear and not outcome.converged:
         raise singular
     if outcome.converged or semismooth.best.iterate is None:
         return state, outcome
     best = semismooth.best.iterate
-    return best, replace(outcome, residuals=evaluate(semismooth.problem, best))
+    return best, replace(outcome, residuals=evaluate(problem, best))
 
 
 def all_open(semismooth: SemismoothNewton) -> State | None:
@@ -189,32 +166,30 @@ def working_set(semismooth: SemismoothNewton, without_contact: State | None) -> 
     return None if residuals.excess(allowed) else (candidate, Outcome(residuals, allowed))
 
 
-def interior_points(
-    semismooth: SemismoothNewton, without_contact: State | None, condensable: bool
-) -> End | None:
+def interior_points(semismooth: SemismoothNewton, without_contact: State | None) -> End | None:
     """Return the end of the interior-point method (`interior_point`) and Newton's last steps."""
     steps = semismooth.steps_left
     if steps <= 0:
         return None
-    # Half of the steps are for the condensed body.
-    return interior_point(semismooth, without_contact, steps // 2 if condensable else steps)
+    if semismooth.condensed_steps is not None:
+        steps //= 2  # the other half is for the condensed body
+    return interior_point(semismooth, without_contact, steps)
 
 
-def on_condensed_body(semismooth: SemismoothNewton, condensed_steps: Stage | None) -> End | None:
+def on_condensed_body(semismooth: SemismoothNewton) -> End | None:
     """Return the end of steps on the condensed body, where they do not pay as the first stage."""
-    if condensed_steps is None or semismooth.steps_left <= 0:
+    if semismooth.condensed_steps is None or semismooth.steps_left <= 0:
         return None
-    end = condensed_steps(semismooth.problem.start())
+    end = semismooth.condensed_steps(semismooth, semismooth.problem.start())
     # The reason of the interior point says more, unless no steps are left.
     return end if end[1].converged or semismooth.steps_left <= 0 else None
 
 
-def rigid_motion(semismooth: SemismoothNewton, outcome: Outcome) -> End | None:
-    """Return a solution of a condensed body with all nodes open after a rigid motion, if any."""
-    problem = semismooth.problem
+def rigid_motion(
+    semismooth: SemismoothNewton, problem: CondensedProblem, outcome: Outcome
+) -> End | None:
+    """Return a solution with all nodes open after a rigid motion, if any."""
     if outcome.converged or semismooth.modes.constrained_by_supports:
-        return None
-    if not isinstance(problem, CondensedProblem):
         return None
     state = semismooth.modes.separated(problem, semismooth.step)
     if state is None:
@@ -293,13 +268,13 @@ def continuation(solve: Callable[[float, State], End], start: State) -> End | No
 
 
 def conductivity_continuation(semismooth: SemismoothNewton) -> End | None:
-    """Solve a condensed body by continuation in k_e of a conductive foundation, if any.
+    """Solve by continuation in k_e of a conductive foundation, if any.
 
     With a large k_e the foundation fixes the potential of a node that comes near, and releases it
     where the node leaves: the active set cycles. With a small one contact is nearly uncoupled.
     """
     problem, interface = semismooth.problem, semismooth.problem.interface
-    if not isinstance(problem, CondensedProblem) or interface.foundation.conductor is None:
+    if interface.foundation.conductor is None:
         return None
 
     def solve(part: float, state: State) -> End:

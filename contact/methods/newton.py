@@ -5,10 +5,10 @@
    whole, without a line search: the residuals may rise while the active set changes, and the
    stagnation limit bounds how long.
 2. Where the contact nodes are few, the body is condensed onto them (static condensation): a loop
-   linearises the material (`Newton._condensed_steps`), and the same method solves contact on the
-   Schur complement, in small dense steps (`semismooth`).
-3. `fallbacks` has the order of all stages: steps on the condensed body and on the whole one, then
-   the fallbacks.
+   linearises the material (`CondensedSteps`), and the same method solves contact on the Schur
+   complement, in small dense steps (`semismooth`).
+3. `Newton.solve` begins on the condensed body where that pays, then or else on the whole one; the
+   stages after these, in turn, are in `fallbacks`.
 
 References
 ----------
@@ -36,17 +36,16 @@ from contact.methods.fallbacks import (
     PROXIMAL_POINT,
     SECANT,
     WORKING_SET,
-    solve_condensed_first,
+    fall_back,
     solve_contact,
 )
 from contact.methods.interior_point import INTERIOR_POINT, OVERLOADED
 from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Monitor, Outcome, Record, Recorder
-from contact.methods.semismooth import ConvergenceMonitor, SemismoothNewton
+from contact.methods.semismooth import ConvergenceMonitor, End, SemismoothNewton
 from contact.methods.unconstrained_modes import RIGID_MOTION, UnconstrainedModes
 from contact.problem.condensed import (
-    AnyProblem,
     Condensation,
     CondensedProblem,
     condensable,
@@ -119,89 +118,31 @@ class Chord:
         return state, reuse
 
 
-@dataclass
-class Newton:
-    """The semismooth Newton method with its fallbacks, on a whole problem; see `Method`."""
+class CondensedSteps:
+    """Newton's steps on the condensed body: a loop over the material of a whole problem.
 
-    problem: ContactProblem
-    options: NewtonOptions = field(default_factory=NewtonOptions)
-    monitor: Monitor | None = None
-    counters: Counters = field(default_factory=Counters)
+    Each solves contact on the Schur complement by the same method, with fallbacks of its own.
+    """
 
-    def __post_init__(self) -> None:
-        """Choose the complementarity parameters, and whether the body is to be condensed."""
-        problem, options = self.problem, self.options
-        self._parameters = problem.scales.complementarity_parameters(options.gamma)
-        self._modes = UnconstrainedModes(problem)
-        self._step = self._newton_step(problem, options, self.counters)
-        self._condenses = options.condense and condensable(problem, options.linear)
-        self._pays = self._condenses and condensation_pays(problem, options.linear)
+    def __init__(self, options: NewtonOptions, linear: bool, counters: Counters) -> None:
+        self._counters = counters
         # The factorisation of a linear body serves all steps.
-        reuses = options.reuse != "never" and not problem.body.linear
-        self._chord = Chord(options.tolerance, MOST_STEPS if reuses else 0.0)
-        #: The condensed body; None before the first condensed step.
+        reuses = options.reuse != "never" and not linear
+        self.chord = Chord(options.tolerance, MOST_STEPS if reuses else 0.0)
+        #: The condensed body; None before the first step.
         self.condensation: Condensation | None = None
-        self.set_load_step(problem)
 
-    def set_load_step(self, problem: ContactProblem) -> None:
-        """Take another load step of the same problem; factorisations remain."""
-        self.problem = self._modes.problem = problem
-        self.recorder = Recorder(self.monitor)
-        if self.condensation is not None:
-            self.condensation.set_load_step(problem)
-        #: The method on the whole body.
-        self.semismooth = SemismoothNewton(
-            problem, self.options, self._step, self._modes, self.recorder
-        )
-
-    def _newton_step(
-        self, problem: AnyProblem, options: NewtonOptions, counters: Counters
-    ) -> NewtonStep:
-        underconstrained = not self._modes.constrained_undeformed
-        return NewtonStep(problem, options, self._parameters, counters, underconstrained)
-
-    @property
-    def history(self) -> list[Record]:
-        """The steps of the last solves."""
-        return self.recorder.records
-
-    @property
-    def state(self) -> State:
-        """The state after the last step."""
-        return self.semismooth.last
-
-    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
-        """Iterate until convergence or the limit; the best iterate on failure; see `Method`."""
-        semismooth, problem, body = self.semismooth, self.problem, self.problem.body
-        self.recorder.begin = time.perf_counter()
-        if self.options.reuse != "across":
-            self._chord.drop()
-        if start is None:
-            begin = replace(problem.start(), secant_at=body.zero_displacement())
-        else:
-            begin = semismooth.started(start)
-        if body.linear:
-            begin = replace(begin, secant_at=None)
-        semismooth.begin(begin)
-        if self._pays:
-            state, outcome = solve_condensed_first(semismooth, begin, self._condensed_steps)
-        else:
-            condensed_steps = self._condensed_steps if self._condenses else None
-            state, outcome = solve_contact(semismooth, begin, condensed_steps)
-        semismooth.last = state
-        return state, outcome
-
-    def _condensed_steps(self, state: State) -> tuple[State, Outcome]:
-        """Iterate over the material; contact is solved on the Schur complement. Collective."""
+    def __call__(self, whole: SemismoothNewton, state: State) -> End:
+        """Iterate from an initial guess until convergence or the limit. Collective."""
         if self.condensation is None:
-            self.condensation = Condensation(self.problem, self.counters)
-        options, body = self.options, self.problem.body
-        monitor, chord = ConvergenceMonitor(self.semismooth, state), self._chord
+            self.condensation = Condensation(whole.modes.problem, self._counters)
+        options, body = whole.options, whole.problem.body
+        monitor, chord = ConvergenceMonitor(whole, state), self.chord
         if monitor.starts_converged:
             return state, monitor.outcome()
         chord.begin()
         tangent = state.near and not body.linear
-        for _ in range(min(options.max_iterations, self.semismooth.steps_left)):
+        for _ in range(min(options.max_iterations, whole.steps_left)):
             previous, last = state, monitor.iterate
             largest = last.residuals.significant
             state, reuse = chord.choose(state, largest)
@@ -215,11 +156,11 @@ class Newton:
             enough = 0.1 * options.tolerance
             if not body.linear and not reuse:
                 enough = max(enough, CONTACT_PART * min(largest, 1.0))
-            method = self._on_contact_nodes(condensed_problem, enough)
+            method = _on_contact_nodes(whole, condensed_problem, enough)
             begin = replace(state, x=condensed_problem.body.x_0, secant_at=None)
             end, outcome = solve_contact(method, begin)
             records = tuple(method.recorder.records)
-            self.counters.contact_solves += sum(record.inner for record in records)
+            self._counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear
             unsolved = outcome.residuals.significant > max(enough, UNSOLVED * largest)
             if unsolved and not overloaded:
@@ -240,10 +181,84 @@ class Newton:
                 return state, stalled
         return state, monitor.out_of_steps()
 
-    def _on_contact_nodes(self, problem: CondensedProblem, tolerance: float) -> SemismoothNewton:
-        """Return the method on a condensed problem, to a tolerance."""
-        # Each stage has a limit of its own.
-        options = self.options.model_copy(update={"tolerance": tolerance, "max_outer": sys.maxsize})
-        step = self._newton_step(problem, options, Counters())
-        recorder = Recorder(lambda _: self.recorder.poll(), logging.DEBUG)
-        return SemismoothNewton(problem, options, step, self._modes, recorder)
+
+def _on_contact_nodes(
+    whole: SemismoothNewton, problem: CondensedProblem, tolerance: float
+) -> SemismoothNewton:
+    """Return the method on a condensed problem, to a tolerance."""
+    # Each stage has a limit of its own.
+    options = whole.options.model_copy(update={"tolerance": tolerance, "max_outer": sys.maxsize})
+    underconstrained = not whole.modes.constrained_undeformed
+    step = NewtonStep(problem, options, whole.step.parameters, Counters(), underconstrained)
+    recorder = Recorder(lambda _: whole.recorder.poll(), logging.DEBUG)
+    return SemismoothNewton(problem, options, step, whole.modes, recorder)
+
+
+@dataclass
+class Newton:
+    """The semismooth Newton method with its fallbacks, on a whole problem; see `Method`."""
+
+    problem: ContactProblem
+    options: NewtonOptions = field(default_factory=NewtonOptions)
+    monitor: Monitor | None = None
+    counters: Counters = field(default_factory=Counters)
+
+    def __post_init__(self) -> None:
+        """Choose the complementarity parameters, and whether the body is to be condensed."""
+        problem, options = self.problem, self.options
+        parameters = problem.scales.complementarity_parameters(options.gamma)
+        self._modes = UnconstrainedModes(problem)
+        underconstrained = not self._modes.constrained_undeformed
+        self._step = NewtonStep(problem, options, parameters, self.counters, underconstrained)
+        self._condenses = options.condense and condensable(problem, options.linear)
+        self._pays = self._condenses and condensation_pays(problem, options.linear)
+        #: Steps on the condensed body: the first stage where they pay, else the last fallback.
+        self.condensed_steps = CondensedSteps(options, problem.body.linear, self.counters)
+        self.set_load_step(problem)
+
+    def set_load_step(self, problem: ContactProblem) -> None:
+        """Take another load step of the same problem; factorisations remain."""
+        self.problem = self._modes.problem = problem
+        self.recorder = Recorder(self.monitor)
+        if self.condensed_steps.condensation is not None:
+            self.condensed_steps.condensation.set_load_step(problem)
+        at_last = self.condensed_steps if self._condenses and not self._pays else None
+        #: The method on the whole body.
+        self.semismooth = SemismoothNewton(
+            problem, self.options, self._step, self._modes, self.recorder, at_last
+        )
+
+    @property
+    def history(self) -> list[Record]:
+        """The steps of the last solves."""
+        return self.recorder.records
+
+    @property
+    def state(self) -> State:
+        """The state after the last step."""
+        return self.semismooth.last
+
+    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
+        """Iterate until convergence or the limit; the best iterate on failure; see `Method`."""
+        semismooth, problem, body = self.semismooth, self.problem, self.problem.body
+        self.recorder.begin = time.perf_counter()
+        if self.options.reuse != "across":
+            self.condensed_steps.chord.drop()
+        if start is None:
+            begin = replace(problem.start(), secant_at=body.zero_displacement())
+        else:
+            begin = semismooth.started(start)
+        if body.linear:
+            begin = replace(begin, secant_at=None)
+        semismooth.begin(begin)
+        if self._pays:
+            state, outcome = self.condensed_steps(semismooth, begin)
+            if not outcome.final and semismooth.steps_left > 0:
+                logger.info("%s; going on with the whole body", outcome.ended)
+                state, outcome = semismooth.iterate(state)
+            if not outcome.final:
+                state, outcome = fall_back(semismooth, state, outcome)
+        else:
+            state, outcome = solve_contact(semismooth, begin)
+        semismooth.last = state
+        return state, outcome

@@ -6,7 +6,9 @@ the iteration. `iterate` takes no fallback: these are of `fallbacks`, which is g
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -26,12 +28,15 @@ OVERESTIMATE = 1e3
 #: Reason of an end whose complementarity parameter overestimates the stiffness.
 OVERESTIMATED = "the complementarity parameter is far above the stiffness of the body"
 
+#: Last iterate and outcome of a stage.
+End: TypeAlias = tuple[State, Outcome]
+
 
 class SemismoothNewton:
     """The semismooth Newton method on one problem, with one operator, that of its step.
 
     `modes` are those of the whole problem; `last` and `best` are the last iterate and that of least
-    residual.
+    residual. `condensed_steps` are the last fallback of a whole problem, from an initial guess.
     """
 
     def __init__(
@@ -41,9 +46,11 @@ class SemismoothNewton:
         step: NewtonStep,
         modes: UnconstrainedModes,
         recorder: Recorder,
+        condensed_steps: Callable[[SemismoothNewton, State], End] | None = None,
     ) -> None:
         self.problem, self.options, self.step = problem, options, step
         self.modes, self.recorder = modes, recorder
+        self.condensed_steps = condensed_steps
         self.begin(problem.start())
 
     def begin(self, state: State) -> None:
@@ -85,7 +92,7 @@ class SemismoothNewton:
         give_up: bool = False,
         exact: bool = False,
         steps: int | None = None,
-    ) -> tuple[State, Outcome]:
+    ) -> End:
         """Iterate from an initial guess until the residuals converge or stagnate. Collective.
 
         The records of the steps have the note. By default the stagnation limit is that of the
@@ -170,7 +177,7 @@ class ConvergenceMonitor:
         sizes = _node_counts(self.iterate.state, self._problem)
         self._semismooth.recorder.record(self.residuals, note, sizes=sizes, steps=steps)
 
-    def ended(self) -> tuple[State, Outcome] | None:
+    def ended(self) -> End | None:
         """Return the end by convergence, divergence, or loss of contact; else None. Collective."""
         state = self.iterate.state
         if self.converged:
@@ -209,7 +216,7 @@ class ConvergenceMonitor:
         jump = interface.nodes.jump(state.x)
         return interface.nodes.maximum(interface.pressure(jump, state.forces))
 
-    def _loss_of_contact(self, state: State) -> tuple[State, Outcome] | None:
+    def _loss_of_contact(self, state: State) -> End | None:
         """Return zero displacement if contact is lost and no load acts; else None. Collective."""
         # Displacements and forces then fall together from step to step: no relative residual does.
         counts, tolerance = _node_counts(state, self._problem), self._options.tolerance
