@@ -66,16 +66,17 @@ esac
 
 
 class Launcher:
-    """A clone with the launcher, a cache and stand-ins, all below paths with spaces."""
+    """A clone with the launcher, a cache and stand-ins, all below paths with signs of shells."""
 
     def __init__(self, folder: Path):
         self.clone = folder / "a clone"
         self.fakes = folder / "fakes"
-        self.cache = folder / "a cache"
+        self.cache = folder / "a & cache"
         self.elsewhere = folder / "else where"
         for place in (self.clone / "scripts", self.fakes, self.elsewhere):
             place.mkdir(parents=True)
         shutil.copy(CLONE / "pyproject.toml", self.clone)
+        shutil.copytree(CLONE / "scripts/bin", self.clone / "scripts/bin")
         shutil.copy(CLONE / "scripts/debian-packages.txt", self.clone / "scripts")
         text = (CLONE / "scripts/fx").read_text()
         # inside a root the real marker would be seen; each start enters a root of its own

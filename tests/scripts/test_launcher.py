@@ -31,10 +31,20 @@ def test_runs_directly_where_fenicsx_is(launcher):
     assert launcher.places() == []
 
 
-def test_contact_that_is_not_installed_is_the_package_of_the_clone(launcher):
-    launcher.fake("python3", '[[ $1 != -m ]] || echo "$PYTHONPATH $*"')
-    status, out, _ = launcher.run("contact", "solve", "a  b")
-    assert (status, out) == (0, f"{launcher.clone} -m contact solve a  b\n")
+@pytest.mark.parametrize("before", [[], ["mpirun", "-n", "2"], ["sh", "-c", '"$@"', "sh"]])
+def test_contact_that_is_not_installed_is_that_of_the_clone(launcher, before):
+    launcher.fake("python3", '[[ $1 == - ]] || echo "$PYTHONPATH $*"')
+    launcher.fake("mpirun", '[[ $1 == --version ]] || exec "${@:3}"')
+    status, out, _ = launcher.run(*before, "contact", "solve", "a  b")
+    command = launcher.clone / "scripts/bin/contact"
+    assert (status, out) == (0, f"{launcher.clone} {command} solve a  b\n")
+
+
+def test_contact_of_the_clone_runs_where_a_folder_has_its_name(tmp_path):
+    (tmp_path / "contact").mkdir()
+    words = [CLONE / "scripts/fx", "mpirun", "-n", "2", "contact", "--version"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout[:8]) == (0, "contact "), done.stderr
 
 
 def test_threads_under_mpi_only_where_the_user_set_none(launcher):
@@ -79,7 +89,8 @@ def test_a_root_without_a_display_gets_one_if_it_starts(launcher, text, display)
         ("0.8.0", "float", "dolfinx 0.8.0 is not in >=0.9,<0.12"),
         ("0.12.0", "float", "dolfinx 0.12.0 is not in >=0.9,<0.12"),
         ("0.9.0", "complex", "complex scalars"),
-        (None, "float", "cannot import dolfinx"),
+        ("ImportError('no dolfinx')", "float", "cannot import it: no dolfinx"),
+        ("RuntimeError('no library\\n/tried')", "float", "cannot import it: no library)"),
     ],
 )
 def test_tells_which_fenicsx_is_supported(launcher, version, scalar, reason):
@@ -87,10 +98,8 @@ def test_tells_which_fenicsx_is_supported(launcher, version, scalar, reason):
     (modules / "petsc4py").mkdir(parents=True)
     (modules / "petsc4py/__init__.py").touch()
     (modules / "petsc4py/PETSc.py").write_text(f"RealType = float\nScalarType = {scalar}\n")
-    text = "raise ModuleNotFoundError(name='dolfinx')"
-    if version is not None:
-        text = f"print('a warning'); __version__ = {version!r}"
-    (modules / "dolfinx.py").write_text(text)
+    text = f"print('a warning'); __version__ = {version!r}"
+    (modules / "dolfinx.py").write_text(f"raise {version}" if "Error" in version else text)
     launcher.fake("python3", f'exec "{sys.executable}" "$@"')
     status, out, err = launcher.run("sh", "-c", "echo here", PYTHONPATH=str(modules))
     if reason is None:
@@ -168,6 +177,31 @@ def test_wheels_come_first_in_the_path(launcher):
     venv = launcher.cache / "contact-fenicsx" / made
     assert (status, out) == (0, f"{venv}\n{venv}/bin/python3\n")
     assert (venv / "pyvenv.cfg").read_text() == f"home = {venv}\n"  # not that of the unfinished
+
+
+def test_wheels_whose_python_has_left_are_made_again(launcher):
+    launcher.python_for_wheels()
+    assert launcher.run("true")[0] == 0
+    (made,) = launcher.places()
+    python = launcher.cache / "contact-fenicsx" / made / "bin/python3"
+    python.unlink()
+    python.symlink_to(launcher.elsewhere / "python3.13")
+    assert launcher.run("true")[0] == 0
+    assert launcher.run("true")[0] == 0
+    assert (launcher.places(), launcher.calls()) == ([made], 2)
+    assert not python.is_symlink()
+
+
+@pytest.mark.parametrize("lacking", ["a C compiler", "Python.h"])
+def test_tells_what_wheels_lack(launcher, lacking):
+    launcher.python_for_wheels()
+    if "compiler" in lacking:
+        (launcher.fakes / "cc").unlink()
+    launcher.fake("python3.13", "echo Python.h; exit 1")
+    status, _, err = launcher.run("true", FENICSX="wheels")
+    assert (status, launcher.places()) == (UNAVAILABLE, [])
+    assert f"the wheels need {lacking}" in err
+    assert "FENICSX=debian before" in err and "FENICSX=wheels" not in err
 
 
 def test_a_python_that_only_prints_an_error_is_none(launcher):
