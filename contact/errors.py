@@ -108,8 +108,9 @@ def installed() -> Iterator[None]:
         text = f"the Python module {name} is needed; accepted: {WAYS}"
         raise InputError(text, "fenicsx") from None
     except Exception as error:
-        if "MPI library" in str(error):
-            raise InputError(f"mpi4py finds none ({error}); accepted: {WAYS}", "fenicsx") from None
+        if re.search("MPI library|libmpi", str(error)):
+            text = f"no library of MPI is found ({error}); accepted: {WAYS}"
+            raise InputError(text, "fenicsx") from None
         # cffi's, and dolfinx's on several ranks.
         of_ranks = re.search("(JIT|just-in-time) compilation", str(error))
         if not of_ranks and type(error).__name__ != "VerificationError":
