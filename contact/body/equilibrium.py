@@ -274,17 +274,17 @@ class BodyEquilibrium:
         return np.asarray((high - low).max(axis=1))
 
     @cached_property
-    def negligible_overlaps(self) -> Array:
-        """Overlaps with connected components that change nothing, (k,) (length). Collective.
+    def thicknesses(self) -> Array:
+        """Twice the volume of each component over the area of its boundary, (k,) (length).
 
-        The thickness of a component is twice its volume over its boundary's area.
+        Collective.
         """
         domain, of_cells, count = self.domain, self.component_of_cells, self.components[1]
         volume, facets = volumes(domain), exterior_facets(domain.mesh)
         behind = of_cells[cells_at(domain.mesh, facets)[0]]
         thickness = 2 * component_sums(self.comm, of_cells[: volume.size], volume, count)
         thickness /= component_sums(self.comm, behind, areas(domain, facets), count)
-        return np.asarray(TOUCHING * thickness)
+        return np.asarray(thickness)
 
     @cached_property
     def position_rounding(self) -> float:
@@ -294,8 +294,8 @@ class BodyEquilibrium:
 
     def accepted_overlaps(self, one: NDArray[np.intp], other: NDArray[np.intp]) -> Array:
         """Return overlaps of components that count as none, shape (n,) (length). Collective."""
-        least = np.minimum(self.negligible_overlaps[one], self.negligible_overlaps[other])
-        return np.maximum(least, self.position_rounding)
+        thinner = np.minimum(self.thicknesses[one], self.thicknesses[other])
+        return np.maximum(TOUCHING * thinner, self.position_rounding)
 
     def components_of(self, *parts: str) -> NDArray[np.bool_]:
         """Return which connected components have facets of boundary parts, (k,). Collective."""

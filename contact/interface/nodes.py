@@ -94,9 +94,6 @@ class ContactNodes:
     motion
         Motion N_q of the foundation by the m global unknowns (`contact.body.global_unknowns`),
         shape (n, block_size, m); None without these.
-    cut
-        Largest depth in the foundation of a node on a straight facet of a curved part; the gap of
-        these nodes is 0 (length).
     revolved
         Whether nodes are rings about the axis x = 0.
     coupling
@@ -114,7 +111,6 @@ class ContactNodes:
     gap: Array
     deviation: Array
     block_size: int
-    cut: float = 0.0
     revolved: bool = False
     motion: Array | None = None
     coupling: CouplingOperator | None = None
@@ -205,12 +201,16 @@ class Geometry:
         Share of each node's area that faces the other body, shape (n,); None before a foundation.
     fixed_conducting
         Nodes that cannot move, but carry charge; None without.
+    cut
+        Largest overlap whose gap is taken as 0: of facets of curves, or of rounded positions
+        (length).
     """
 
     nodes: ContactNodes
     jumps: JumpRows | None
     covered: Array | None = None
     fixed_conducting: ContactNodes | None = None
+    cut: float = 0.0
 
 
 def joined_nodes(
@@ -299,5 +299,4 @@ def side_by_side(
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(group, name) for group in groups]) for name in names
     }
-    cut = max(group.cut for group in groups)
-    return replace(first, cut=cut, coupling=coupling, **arrays)
+    return replace(first, coupling=coupling, **arrays)

@@ -27,7 +27,7 @@ from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle
 from contact.model.obstacle.shapes import measured
-from contact.tolerances import ROUNDING
+from contact.tolerances import ROUNDING, TOUCHING
 from contact.typing import Array
 
 #: Share of a facet that faces the master, if its nodes are not beyond the rim of that.
@@ -52,12 +52,7 @@ class PairPlacement:
     nodes: NDArray[np.int64]  #: global numbers of this rank's nodes with a multiplier, (n,)
     added: Array  #: gap at `nodes` beside that between the meshes, shape (n,) (length)
     press: bool  #: whether overlaps in the reference configuration are interferences
-    negligible: float  #: overlap that changes nothing (length)
-
-    @property
-    def rounding(self) -> float:
-        """Overlap that counts as rounding (length). Collective."""
-        return max(self.negligible, self.body.position_rounding)
+    rounding: float  #: overlap that counts as rounding (length)
 
     def at(self, displacement: Array) -> Geometry:
         """Return the geometry at a displacement of the owned nodes, shape (nodes, d). Collective.
@@ -76,7 +71,6 @@ class PairPlacement:
         gap, cut = coupling.gap, 0.0
         if not self.press and coupling.depth <= self.rounding:
             gap, cut = _without_sagittas(body.comm, coupling)
-            cut = cut if cut > self.negligible else 0.0
         unknown = body.comm.allreduce(
             max(side.unknown_deviation for side in (slave, master)), op=MPI.MAX
         )
@@ -94,11 +88,10 @@ class PairPlacement:
             gap=gap + self.added,
             deviation=np.full(local.size, unknown),
             block_size=body.block_size,
-            cut=cut,
             revolved=body.domain.revolved,
             motion=body.global_unknowns.of_foundation(points, body.block_size),
         )
-        return Geometry(nodes, coupling, coupling.covered)
+        return Geometry(nodes, coupling, coupling.covered, cut=cut)
 
 
 def _without_sagittas(comm: MPI.Intracomm, coupling: Coupling) -> tuple[Array, float]:
@@ -168,9 +161,10 @@ def find_pair(
             "pair",
         )
     _check_apart(body, coupling, slave.owners, label)
-    negligible = float(body.negligible_overlaps[body.components_of(part, against)].min())
+    thinner = float(body.thicknesses[body.components_of(part, against)].min())
+    rounding = max(TOUCHING * thinner, body.position_rounding)
     placement = PairPlacement(
-        body, slave, master, reach, no_multiplier, coupling.nodes, added, press, negligible
+        body, slave, master, reach, no_multiplier, coupling.nodes, added, press, rounding
     )
     _check_overlap(placement, coupling, overlap, alone, label)
     return placement, placement.geometry(slave, master, coupling)

@@ -27,6 +27,7 @@ from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle, Shape
 from contact.model.obstacle.shapes import measured
 from contact.ranks import on_all_ranks
+from contact.tolerances import TOUCHING
 from contact.typing import Array
 
 #: Depth in a shape that counts as rounding, over that in a body: numbers of shapes are written by
@@ -51,7 +52,6 @@ class Candidates:
     #: Depth of the nodes, shape (n,) (length), in a shape that the curved surface, or the straight
     #: facets, touch, and rounding.
     chord_penetration: Array
-    negligible: float  #: depth in a shape that changes nothing (length)
     rounding: float  #: and that counts as rounding (length)
     direction: Array  #: the contact direction, shape (n, d)
     measured: Array  #: the gap from `front`, shape (n,)
@@ -88,7 +88,7 @@ def find_candidates(
     shape (nodes, d).
     """
     comm, lumped = body.comm, Lumping.of(facets).without_axis(facets)
-    negligible, rounding = _negligible(body, part)
+    rounding = _rounding(body, part)
     # Functions without a mean on Gamma_3 carry nothing: P2 vertices on the axis of revolution.
     size = np.array([lumped.weight.sum(), lumped.weight.size])
     area, count = comm.allreduce(size, op=MPI.SUM)
@@ -124,7 +124,6 @@ def find_candidates(
         front=front,
         # The contact direction may differ a little from the normal.
         chord_penetration=rounding + 1.1 * chord_penetration,
-        negligible=negligible,
         rounding=rounding,
         direction=direction,
         measured=gap,
@@ -135,10 +134,10 @@ def find_candidates(
     )
 
 
-def _negligible(body: BodyEquilibrium, part: str) -> tuple[float, float]:
-    """Return depths of a part in a shape that change nothing, and are rounding. Collective."""
-    negligible = BY_HAND * float(body.negligible_overlaps[body.components_of(part)].min())
-    return negligible, max(negligible, BY_HAND * body.position_rounding)
+def _rounding(body: BodyEquilibrium, part: str) -> float:
+    """Return the depth of a part in a shape that counts as rounding (length). Collective."""
+    thinnest = float(body.thicknesses[body.components_of(part)].min())
+    return BY_HAND * max(TOUCHING * thinnest, body.position_rounding)
 
 
 def _from_curve(
@@ -175,7 +174,7 @@ class FoundationPlacement:
     def refuse_unresolved(self) -> None:
         """Refuse a shape that cuts facets between their nodes. Collective."""
         try:
-            _refuse_unresolved(self.obstacle, self.facets, _negligible(self.body, self.part)[1])
+            _refuse_unresolved(self.obstacle, self.facets, _rounding(self.body, self.part))
         except InputError as error:
             raise error.within(f"{self.key}.") from None
 
@@ -210,14 +209,13 @@ class FoundationPlacement:
             gap=candidates.of_jumps(gap)[self.contact],
             deviation=candidates.unknown[self.contact],
             block_size=body.block_size,
-            cut=cut if cut > candidates.negligible else 0.0,
             revolved=body.domain.revolved,
             motion=body.global_unknowns.of_foundation(
                 candidates.places[self.contact], body.block_size, self.part
             ),
         )
         if self.fixed_conducting is None:
-            return Geometry(nodes, candidates.jumps)
+            return Geometry(nodes, candidates.jumps, cut=cut)
         conducting = self.fixed_conducting
         conducting_nodes = candidates.nodes[conducting]
         fixed_conducting = replace(
@@ -232,7 +230,7 @@ class FoundationPlacement:
             deviation=candidates.unknown[conducting],
             motion=None,
         )
-        return Geometry(nodes, candidates.jumps, fixed_conducting=fixed_conducting)
+        return Geometry(nodes, candidates.jumps, fixed_conducting=fixed_conducting, cut=cut)
 
 
 def find_nodes(

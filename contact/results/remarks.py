@@ -30,7 +30,7 @@ from contact.results import bodies
 from contact.results.error_estimate import estimated
 from contact.results.fields import DerivedFields, deformation, unloaded
 from contact.results.solution import Note, Remark, Solution
-from contact.tolerances import EPS, NEGLIGIBLE
+from contact.tolerances import EPS, NEGLIGIBLE, TOUCHING
 from contact.typing import Array
 from forms.j2 import J2
 from forms.monotonicity import check_monotonicity
@@ -62,6 +62,9 @@ COARSE = 0.15
 #: Largest deviation of facets from a curved surface, as a share of the gaps that are closed, or of
 #: the pressure by it, as a share of the largest.
 DEVIATION = 0.1
+
+#: Strain of a facet by an overlap that is taken as 0, over the largest strain, that is warned of.
+DROPPED = 0.01
 
 #: Largest turn h/R of a straight edge of degree 2 without a warning.
 TURN = 0.05
@@ -482,12 +485,7 @@ def beyond_heights(problem: ContactProblem, touched: NDArray[np.bool_]) -> Itera
 def coarse_curves(solution: Solution) -> Iterator[Remark]:
     """Warn of straight facets of a curved surface whose deviation decides gaps or pressures."""
     problem, nodes = solution.problem, solution.problem.nodes
-    if nodes.cut > 0:
-        yield (
-            f"contact surfaces overlap by up to {nodes.cut:.3g}, as facets of curves or rounded "
-            f"positions do: the gap there is taken as 0; accepted: of curves {FINER}, of an "
-            'interference overlap = "press"'
-        )
+    yield from _dropped_overlaps(solution)
     closed, uncertainty = solution.status != "open", nodes.maximum(nodes.deviation)
     if nodes.maximum(closed.astype(float)) == 0:
         least = -nodes.maximum(-problem.interface.gap, -np.inf)
@@ -509,6 +507,25 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
                     f"and contact of {contact.on} closes gaps of at most {size:.3g}; "
                     f"accepted: {FINER}"
                 )
+
+
+def _dropped_overlaps(solution: Solution) -> Iterator[Remark]:
+    """Warn of overlaps that are taken as 0, but would strain facets notably. Collective."""
+    problem, made = solution.problem, solution.deformation
+    least = max(TOUCHING, DROPPED * made.largest_strain if made is not None else 0.0)
+    for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
+        if geometry.cut == 0:
+            continue
+        body, parts = problem.body, [part for part in (contact.on, contact.against) if part]
+        sides = [surface_of(problem.domain, body.space, part) for part in parts]
+        edge = min(float(side.edges.min(initial=np.inf)) for side in sides)
+        thinner = float(body.thicknesses[body.components_of(*parts)].min())
+        if geometry.cut > least * min(problem.comm.allreduce(edge, op=MPI.MIN), thinner):
+            yield (
+                f"contact surfaces overlap by up to {geometry.cut:.3g} at {contact.on}, as facets "
+                "of curves or rounded positions do: the gap there is taken as 0; accepted: of "
+                f'curves {FINER}, of an interference overlap = "press"'
+            )
 
 
 def _straight_edges(solution: Solution, closed: NDArray[np.bool_]) -> Iterator[Remark]:

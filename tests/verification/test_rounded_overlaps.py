@@ -10,12 +10,14 @@ from tests.problems.overlapping import (
     ELEMENTS,
     PLANE,
     POISSON,
+    RADII,
     SPACE,
     UNIAXIAL,
     YOUNG,
     body,
     layers,
     mean,
+    of_layer,
     pressure,
     told,
 )
@@ -62,6 +64,33 @@ def test_depths_that_rounded_positions_may_have_are_said():
         pressed = solve(Problem(domain, given, Contact(**BETWEEN, press=True)))
         stretch = depth / (SMALL[2] - SMALL[0])
         assert mean(pressed) == pytest.approx(UNIAXIAL * stretch, rel=1e-4)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("loaded", [False, True])
+@pytest.mark.parametrize("cell", [*PLANE, "hexahedron"])
+def test_depths_that_strain_thin_tips_of_thick_bodies_are_said(cell, loaded, degree):
+    """The thickness of a body is a mean: what is nothing to its bulk may strain a tip of it."""
+    tip, heads = 1e-3, ["inner0", "outer1"]
+    for depth, said in ((3e-7, True), (1e-12, False)):
+        domain = layers(COMM, cell, 1, "flat", 0.0, counts=(4, 4))
+        d, x = domain.dim, domain.mesh.geometry.x
+        second = of_layer(domain, 1)
+        along = 2 * np.abs(x[:, 0] - RADII[1])
+        x[:, 1:d] *= np.where(along < 0.3, tip, 1.0)[:, None]
+        place = np.interp(along, [0, 0.25, 1.0], [0.0, tip, 1.0])
+        x[:, 0] = 1 + np.where(second, place - depth, -place)
+        given = [Fixed(name, [0.0] * d) for name in heads]
+        if loaded:
+            given[0] = Fixed("inner0", [1e-6, *[0.0] * (d - 1)])
+        body, axis = Body(Linear(YOUNG, POISSON), given), np.eye(d)[0]
+        wall = Plane((1 - depth) * axis, -axis)
+        for contact in (Contact(**BETWEEN), Contact("outer0", wall)):
+            solution = solve(Problem(domain, body, contact, degree=degree))
+            warnings = [text for text in solution.warnings if "overlap" in text]
+            assert len(warnings) == said
+            assert all(f"by up to {depth:.3g} at outer0" in text for text in warnings)
 
 
 @pytest.mark.parallel
