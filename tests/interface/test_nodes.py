@@ -177,7 +177,7 @@ def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation"
         domain = refined(domain)
     body = Body(LAW, [Fixed("arc", (ZERO, ZERO))])
     rigid = shape((0.0, 2.0), radius, direction=direction)
-    return ContactProblem(domain, body, Contact("top", rigid), degree=degree).nodes
+    return ContactProblem(domain, body, Contact("top", rigid), degree=degree).geometries[0]
 
 
 @pytest.mark.core
@@ -187,11 +187,11 @@ def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation"
 def test_straight_facets_around_a_circle_touch_it(degree, levels, direction, shape):
     """The corners lie on the circle; refined edges are in it by the depth of their chords."""
     cells = 6
-    nodes = around_a_circle(1.0, degree, levels, cells, direction, shape)
+    close = around_a_circle(1.0, degree, levels, cells, direction, shape)
     depth = 1 - np.cos(np.pi / 6 / cells)
-    assert np.abs(nodes.gap).max() < 1e-12
-    assert nodes.cut == pytest.approx(depth if levels else 0.0)
-    loose = around_a_circle(1.0 - 0.5 * depth, degree, levels, cells, direction, shape)
+    assert np.abs(close.nodes.gap).max() < 1e-12
+    assert close.cut == pytest.approx(depth if levels else 0.0)
+    loose = around_a_circle(1.0 - 0.5 * depth, degree, levels, cells, direction, shape).nodes
     assert loose.gap.min() == pytest.approx(0.0 if levels else 0.5 * depth, rel=0.01)
     assert loose.gap.max() == pytest.approx(0.5 * depth, rel=0.01)
 
