@@ -5,7 +5,7 @@
 bend, stick, stretch and harden), cells (200 on cells of all shapes and degrees), bodies (500 of
 several bodies, checked by an independent assembly), held (400 that friction alone holds), plastic
 (60 evolutions of metals, checked by their energies), pairs (100 blocks on each other). All but
-bodies and held also run under mpirun.
+bodies and held also run under mpirun. docs/robustness.md has the tables.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -36,12 +37,16 @@ SMALL = 1e-6
 AGREE = 1e-7
 #: Notes on steps of Newton's method itself.
 OWN = "chord step", "tangent", "rejected", "initial guess"
-NOTE = (
-    "Problems are drawn with a fixed seed: loads, friction, cells, degrees and geometries. A "
-    "fallback is any method that Newton's method takes beside its own steps; solves are linear "
-    "ones. The difference is that of displacements to those of the first method, over the largest "
-    "displacement."
-)
+#: Captions of the tables.
+CAPTIONS = {
+    "plain": "Problems like those of the thesis",
+    "hard": "Bodies that bend, stick, stretch and harden",
+    "cells": "Cells of all shapes",
+    "bodies": "Several bodies, checked by an independent assembly",
+    "held": "Bodies that friction alone holds",
+    "plastic": "Evolutions of metals, checked by their energies",
+    "pairs": "Blocks on each other",
+}
 
 
 def along_normal(solution: Solution) -> float:
@@ -128,22 +133,26 @@ def _difference(solution: Solution, other: Solution) -> float:
 
 def table(rows: Mapping[str, list[Any]], methods: Sequence[str]) -> dict[str, list[Any]]:
     """Count by family and method."""
-    other = [end for end in ("refused", "false") if end in rows["end"]]
+    others = [end for end in ("not converged", "refused", "false") if end in rows["end"]]
+    compared = ["method", "largest difference"] if len(methods) > 1 else []
+    solves = "solves, median", "most"
     made = empty(
-        "family", "method", "problems", "converged", "without fallback", *other, "median solves",
-        "most solves", "largest difference",
-    )  # fmt: skip
+        "family", *compared[:1], "problems", "right", *others, *solves, *compared[1:], "fallbacks"
+    )
     family = np.array([name.rsplit("-", 1)[0] for name in rows["problem"]])
     method, end, why = (np.array(rows[name]) for name in ("method", "end", "why"))
-    solves, difference = np.array(rows["solves"]), np.array(rows["difference"])
+    count, difference = np.array(rows["solves"]), np.array(rows["difference"])
     for name in dict.fromkeys(family.tolist()):
         for way in methods:
             chosen = (family == name) & (method == way)
             right = chosen & (end == "right")
-            counts = chosen.sum(), right.sum(), (right & (why == "")).sum()
-            counts += tuple((end[chosen] == word).sum() for word in other)
-            most = solves[chosen].max(), difference[right].max(initial=0.0)
-            append(made, name, way, *counts, int(np.median(solves[chosen])), *most)
+            ends = chosen.sum(), right.sum(), *((end[chosen] == word).sum() for word in others)
+            most = (difference[right].max(initial=0.0),) if compared else ()
+            taken = Counter(word for words in why[right] for word in words.split(", ") if word)
+            words = ", ".join(f"{word} {n}" for word, n in taken.most_common()) or "none"
+            of_solves = int(np.median(count[chosen])), int(count[chosen].max())
+            named = (way,) if compared else ()
+            append(made, name, *named, *map(int, ends), *of_solves, *most, words)
     return made
 
 
@@ -173,10 +182,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not found:
         command.error(f"--only {given.only}: no such problem of this kind")
     rows = {key: [row[key] for row in found] for key in found[0]}
+    name, caption = given.kind, CAPTIONS[given.kind]
+    if given.seed is not None:
+        name, caption = f"{name}-{given.seed}", f"{caption}, drawn anew"
     report = Report(given.out)
-    report.numbers(f"sweep-{given.kind}", rows)
-    counts = table(rows, given.methods)
-    report.table(f"sweep-{given.kind}-summary", "Robustness sweep", counts, NOTE)
+    report.numbers(f"{name}-problems", rows)
+    report.table(name, caption, table(rows, given.methods))
     return 1 if "false" in rows["end"] else 0
 
 
