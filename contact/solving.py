@@ -20,7 +20,7 @@ from dataclasses import replace
 from functools import partial
 from numbers import Real
 from pathlib import Path
-from typing import Unpack
+from typing import TypeAlias, Unpack
 
 import numpy as np
 from mpi4py import MPI
@@ -54,6 +54,9 @@ logger = logging.getLogger("contact.steps")
 #: Names of initial guesses, for messages about the solution.
 ZERO, GIVEN = "the zero initial guess", "the state that was given"
 BEFORE, COARSE = "the step before", "the solution on a coarser mesh"
+
+#: Solves a problem by a method.
+Solver: TypeAlias = Callable[[ContactProblem, Method], Solution]
 
 
 class SolveInterrupted(SystemExit):
@@ -128,18 +131,15 @@ def solve(
     if isinstance(case, ContactProblem):
         start = None if start is None else _prescribed(case, start)
         return reviewed(solve_problem(case, options, monitor, partial(solve_static, start=start)))
-    evolution = case.evolution
-
-    def solver(problem: ContactProblem, start: State | None, guess: str = COARSE) -> Solution:
-        if evolution is None:
-            step = partial(solve_static, start=start, guess=guess)
-        else:
-            step = partial(solve_in_steps, times=evolution.step_times)
-        return solve_problem(problem, options, monitor, step)
-
     with naming_case(case.source):
         if case.adapt is not None:
-            solution = adapted(case, comm, solver)
+            solution = adapted(
+                case,
+                comm,
+                lambda problem, start: solve_problem(
+                    problem, options, monitor, solver_of(case, start)
+                ),
+            )
         else:
             problem, guess = build_problem(case, comm, **replacements), GIVEN
             if start is not None:
@@ -147,7 +147,7 @@ def solve(
             else:
                 chosen = case.model_copy(update={"solver": options})
                 start, guess = default_start(chosen, problem, **replacements), COARSE
-            solution = solver(problem, start, guess)
+            solution = solve_problem(problem, options, monitor, solver_of(case, start, guess))
         return reviewed(solution, case, clock, described=not replacements)
 
 
@@ -305,11 +305,18 @@ def solve_in_steps(
     return Solution(here, state, outcome, history, counters, name, {}, start=guess, steps=records)
 
 
+def solver_of(case: Case, start: State | None, guess: str = COARSE) -> Solver:
+    """Return what solves a case's problem: its load steps, or one from the initial guess."""
+    if case.evolution is not None:
+        return partial(solve_in_steps, times=case.evolution.step_times)
+    return partial(solve_static, start=start, guess=guess)
+
+
 def solve_problem(
     problem: ContactProblem,
     settings: Options,
     monitor: Monitor | None = None,
-    solver: Callable[[ContactProblem, Method], Solution] = solve_static,
+    solver: Solver = solve_static,
 ) -> Solution:
     """Solve a problem by a new method, and look for other solutions; not reviewed. Collective."""
     clock = time.perf_counter()

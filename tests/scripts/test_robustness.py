@@ -148,7 +148,7 @@ def test_the_table_of_the_study(tmp_path, capsys):
     assert float(rows[1]["largest difference"]) < 1e-7
     lines = (tmp_path / "bodies-problems.csv").read_text().splitlines()
     assert lines[1].startswith("clouds-0,newton,right")
-    assert (tmp_path / "bodies.csv").read_text().startswith("family,problems,right,solves")
+    assert (tmp_path / "bodies.csv").read_text().startswith("family,problems,right,median solves")
 
 
 def test_devices_are_there_to_be_switched_off():

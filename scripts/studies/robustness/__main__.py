@@ -135,7 +135,7 @@ def table(rows: Mapping[str, list[Any]], methods: Sequence[str]) -> dict[str, li
     """Count by family and method."""
     others = [end for end in ("not converged", "refused", "false") if end in rows["end"]]
     compared = ["method", "largest difference"] if len(methods) > 1 else []
-    solves = "solves, median", "most"
+    solves = "median solves", "most solves"
     made = empty(
         "family", *compared[:1], "problems", "right", *others, *solves, *compared[1:], "fallbacks"
     )
