@@ -306,7 +306,7 @@ def solve_in_steps(
 
 
 def solver_of(case: Case, start: State | None, guess: str = COARSE) -> Solver:
-    """Return what solves a case's problem: its load steps, or one from the initial guess."""
+    """Return the solver of a case: of its load steps, or from an initial guess."""
     if case.evolution is not None:
         return partial(solve_in_steps, times=case.evolution.step_times)
     return partial(solve_static, start=start, guess=guess)
