@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from contact.arguments import check_range
 from contact.body.description import Body
+from contact.case.checks import check_mesh
 from contact.case.file import Case
 from contact.errors import InputError
 from contact.mesh.domain import Domain, revolved
@@ -88,7 +89,7 @@ def build_problem(
         if case.space.kinematics == "axisymmetric":
             domain = revolved(domain)
         check_range("mesh", domain.size)
-        case.check_mesh(domain.dim, domain.names)
+        check_mesh(case, domain.dim, domain.names)
         body = Body(
             _materials(case, domain, law),
             [_acting(case, fixed) for fixed in case.fixed],

@@ -27,7 +27,7 @@ from pydantic import (
     model_validator,
 )
 
-from contact.case.checks import check_mesh, check_sections
+from contact.case.checks import check_sections
 from contact.case.mesh import Adapt, Mesh, cut_about_axis
 from contact.errors import InputError, clipped, shown
 from contact.methods.options import OPTIONS, NewtonOptions, Options
@@ -43,7 +43,7 @@ from contact.model.rigid import Rigid
 from contact.model.section import OneOrSome, Section, Text, as_tuple, walk
 from contact.model.units import NAMES, SYSTEMS, labels_of
 from contact.results.options import OutputOptions, Units
-from contact.settings import Accepted, Fault
+from contact.settings import Accepted
 
 Kind = TypeVar("Kind")
 Materials: TypeAlias = Annotated[
@@ -206,13 +206,6 @@ class Case(Section):
     def _check(self) -> Self:
         check_sections(self)
         return self
-
-    def check_mesh(self, dimension: int, parts: Iterable[str]) -> None:
-        """Refuse a case that does not fit its mesh, of a dimension and with some parts."""
-        try:
-            check_mesh(self, dimension, parts)
-        except Fault as error:
-            raise error.within(f"{self._source}: ") from None
 
 
 def _share_units(given: Any) -> Any:

@@ -182,11 +182,6 @@ class Mesh(Section):
         name = self.cell or grid.CELLS.get(self.generator or "", (None,))[0]
         return None if name is None else Shape(name)
 
-    @property
-    def dimension(self) -> int | None:
-        """Space dimension; None if only the mesh itself can tell."""
-        return len(self.sides) // 2 or None
-
     @model_validator(mode="before")
     @classmethod
     def _gather_parameters(cls, given: Any) -> Any:

@@ -100,11 +100,6 @@ class Fixed(Described):
         return self
 
     @property
-    def is_clamped(self) -> bool:
-        """True if every component of the displacement is prescribed."""
-        return self.displacement is not None and "free" not in self.displacement
-
-    @property
     def components(self) -> dict[int, Field | Moving]:
         """The components of the displacement that are prescribed."""
         if self.symmetry is not None:

@@ -160,15 +160,15 @@ class Motion(Described):
         """The moment, as a list."""
         return self.moment if isinstance(self.moment, tuple) else (self.moment,)
 
-    def check_dimension(self, dimension: int, path: str = "") -> None:
-        """Raise a fault if a rotation is none of the space; `path` is that of the motion."""
+    def check_dimension(self, dimension: int) -> None:
+        """Raise a fault if a rotation is none of the space."""
         for key in ("rotation", "moment"):
             value = getattr(self, key)
             fits = isinstance(value, tuple) == (dimension == 3) or value == ZERO
             if not fits or (isinstance(value, tuple) and len(value) != 3):
                 accepted = "one angle or moment in 2-D, a list of 3 in 3-D"
                 given = f"a list of {len(value)}" if isinstance(value, tuple) else "one"
-                raise fault(f"{path}{key}", Words(f"given {given}"), accepted)
+                raise fault(key, Words(f"given {given}"), accepted)
 
     @property
     def off_axis(self) -> str | None:

@@ -1,7 +1,7 @@
 """Building blocks of descriptions: tables of a case file, and kinds of their values.
 
-Each kind of value carries the accepted ones in words. `walk` finds `Spatial` lists and `FilePath`
-by their classes, parts and amplitudes by their keys.
+Each kind of value carries the accepted ones in words. `walk` finds `FilePath` by its class, parts
+and amplitudes by their keys.
 """
 
 from __future__ import annotations
@@ -379,16 +379,10 @@ def _in_time(given: Any, info: ValidationInfo) -> Any:
 as_tuple = BeforeValidator(_components)
 
 
-class Spatial(tuple[One, ...]):
-    """A list of one entry a dimension."""
-
-
 #: Components of a vector, in 2-D or 3-D, given as a list; in Python a function of the time too
 #: (`FewTimed`). A list of one or more (`Some`). One value, or a list of another type (`Either`),
 #: or of the same one (`OneOrSome`: [contact] or [[contact]]).
-Few: TypeAlias = Annotated[
-    tuple[One, ...], Bounds(min_length=2, max_length=3), as_tuple, AfterValidator(Spatial)
-]
+Few: TypeAlias = Annotated[tuple[One, ...], Bounds(min_length=2, max_length=3), as_tuple]
 FewTimed: TypeAlias = Annotated[Few[One], BeforeValidator(_in_time)]
 Some: TypeAlias = Annotated[tuple[One, ...], Bounds(min_length=1), as_tuple]
 Either: TypeAlias = Annotated[

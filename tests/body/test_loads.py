@@ -74,13 +74,13 @@ def test_the_case_file_says_the_same_without_a_warning():
     ("keys", "words"),
     [
         ({"force": ["-x", 0.0]}, r"load\.0\.force\.0.*\[formula-variable\]"),
-        ({"force": [0.0, 0.0, 1.0]}, r"load\.0\.force.*\[value\]"),
+        ({"force": [0.0, 0.0, 1.0]}, r"\[components\]"),
         ({"resultant": [0.0, 1.0]}, r"\[unknown-key\]"),
     ],
 )
 def test_other_resultants_are_refused(keys, words):
     with pytest.raises(InputError, match=words):
-        parse_case(case(**keys))
+        build_problem(parse_case(case(**keys)))
 
 
 def test_a_resultant_in_the_whole_body_is_refused():

@@ -205,8 +205,6 @@ def test_the_stress_has_a_constant_mean_in_each_cell():
 
 
 def test_degree_1_is_refused_with_the_reason():
-    with pytest.raises(InputError, match=r"space.*\[value\]"):
-        parse_case(changed(space__element=MEAN))
     with pytest.raises(InputError, match=r"\[value\]"):
         BodyEquilibrium(domain_of("plane"), Body(Linear(1.0, 0.3), ()), 1, MEAN)
     with pytest.raises(InputError, match=r"\[value\]"):

@@ -6,7 +6,9 @@ Foundations in the case file that are none.
 from __future__ import annotations
 
 import pytest
+from mpi4py import MPI
 
+from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.model.obstacle import SHAPES
@@ -95,10 +97,14 @@ NEARLY = [
 ]
 
 
+def built(data, source="case"):
+    return build_problem(parse_case(data, source=source), MPI.COMM_SELF)
+
+
 @pytest.mark.wording
 def test_messages_of_bad_cases(snapshot):
     said = {
-        name: message_of(parse_case, changed(**changes), source="bar.toml")
+        name: message_of(built, changed(**changes), source="bar.toml")
         for name, changes in BAD.items()
     }
     assert all(message.startswith("bar.toml: ") for message in said.values())
@@ -139,7 +145,7 @@ BAD_SHAPES = {
 
 def shaped(foundation, more):
     floats = {k: [float(x) for x in v] if isinstance(v, list) else v for k, v in foundation.items()}
-    return parse_case({**CASE, "contact": {"on": "bottom", "foundation": floats, **more}})
+    return built({**CASE, "contact": {"on": "bottom", "foundation": floats, **more}})
 
 
 @pytest.mark.wording
@@ -159,7 +165,7 @@ def test_a_surface_is_no_foundation_in_the_plane():
     foundation = {"shape": "surface", "file": "a.stl"}
     fixed = [{"on": "top", "displacement": [0.0, 0.0]}]
     with pytest.raises(InputError, match=r"\[value\]"):
-        parse_case(
+        built(
             {
                 **CASE,
                 "mesh": mesh,

@@ -238,7 +238,7 @@ def test_bad_motions_are_refused(changes, words):
 @pytest.mark.parametrize(
     ("rigid", "words"),
     [
-        ([{"on": "bottom"}], r"rigid.0.on.*\[value\]"),
+        ([{"on": "bottom"}], r"\[held-part\]"),
         ([{"on": "top"}, {"on": "right"}], r"\[rigid-part\]"),
         ([{"on": "top", "displacement": ["free", 0.0]}], r"\[rigid-part\]"),
     ],

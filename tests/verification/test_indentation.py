@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("gmsh")
 from contact import load_case, parse_case, solve
+from contact.case.build import build_problem
 from contact.errors import InputError
 from forms.elasticity import hexagonal
 from scripts.cases import CASES
@@ -122,7 +123,7 @@ def test_hertz_ball_with_few_unknowns():
 )
 def test_an_indenter_moves_along_the_axis(change, words):
     with pytest.raises(InputError, match=words):
-        load_case(CASES / "indent-cone.toml", [change])
+        build_problem(load_case(CASES / "indent-cone.toml", [change]))
 
 
 @pytest.mark.core
