@@ -32,15 +32,16 @@ def read_data(path: str | Path) -> dict[str, Array]:
     path = Path(path)
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            numbered = [(i, row) for i, row in enumerate(csv.reader(file), 1) if row]
-        if not numbered:
-            raise ValueError("it is empty")
-        names = [name.strip() for name in numbered[0][1]]
-        if len(set(names)) < len(names):
-            raise ValueError("a name stands twice")
-        if all(map(_is_number, names)):
-            raise ValueError("its first row has numbers")
-        values = np.array([_numbers(number, names, row) for number, row in numbered[1:]])
+            rows = [(i, row) for i, row in enumerate(csv.reader(file), 1) if row]
+        names = [name.strip() for name in rows[0][1]] if rows else []
+        if not names or len(set(names)) < len(names) or _floats(names) is not None:
+            raise ValueError("its first row has no different names")
+        values = []
+        for number, row in rows[1:]:
+            floats = _floats(row)
+            if floats is None or len(row) != len(names):
+                raise ValueError(f"row {number} has not one number for each of {len(names)} names")
+            values.append(floats)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; accepted: a CSV file", "data-file") from None
     except ValueError as error:
@@ -49,25 +50,13 @@ def read_data(path: str | Path) -> dict[str, Array]:
             "separated by commas",
             "data-file",
         ) from None
-    columns = values.reshape(-1, len(names)).T
+    columns = np.reshape(values, (-1, len(names))).T
     return dict(zip(names, columns, strict=True))
 
 
-def _is_number(text: str) -> bool:
+def _floats(texts: Sequence[str]) -> list[float] | None:
+    """Return texts as numbers; None if they are not all."""
     try:
-        return bool(np.isfinite(float(text)))
+        return [float(text) for text in texts]
     except ValueError:
-        return False
-
-
-def _numbers(number: int, names: Sequence[str], row: Sequence[str]) -> list[float]:
-    """Return the numbers of a row, or raise a ValueError that says where there is none."""
-    if len(row) != len(names):
-        raise ValueError(f"row {number} has {len(row)} values for {len(names)} names")
-    found = []
-    for name, text in zip(names, row, strict=True):
-        try:
-            found.append(float(text))
-        except ValueError:
-            raise ValueError(f"row {number}, column {name}: {text!r} is no number") from None
-    return found
+        return None
