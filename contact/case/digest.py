@@ -94,15 +94,14 @@ def check_same(
 
 def _differences(before: Any, now: Any, path: str = "") -> Iterator[str]:
     """Yield the differences in words, key by key."""
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        before, now = dict(enumerate(before)), dict(enumerate(now))
     if isinstance(before, dict) and isinstance(now, dict):
-        for key in (*before, *(key for key in now if key not in before)):
+        for key in {**before, **now}:
             place = f"{path}.{key}" if path else key
             if key not in before or key not in now:
                 yield f"{place} is {'given' if key in before else 'missing'}"
             else:
                 yield from _differences(before[key], now[key], place)
-    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        for i, pair in enumerate(zip(before, now, strict=True)):
-            yield from _differences(*pair, f"{path}.{i}")
     elif before != now and not (before != before and now != now):
         yield f"{path} is {shown(before)}, here {shown(now)}"
