@@ -13,7 +13,7 @@ import sys
 import time
 import traceback
 from collections.abc import Sequence
-from importlib import import_module
+from pkgutil import resolve_name
 
 from mpi4py import MPI
 
@@ -32,19 +32,19 @@ CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 #: EX_SOFTWARE: a fault of the program.
 CRASH = 70
 
-#: Command -> its module. They load dolfinx, which PETSc's options have to precede.
+#: Command -> its function. Their modules load dolfinx, which PETSc's options have to precede.
 COMMANDS = {
-    "new": "contact.cli.new",
-    "mesh": "contact.cli.new",
-    "check": "contact.cli.check",
-    "solve": "contact.cli.solve",
-    "sweep": "contact.cli.solve",
-    "plot": "contact.cli.plot",
-    "view": "contact.cli.plot",
-    "identify": "contact.cli.identify",
-    "materials": "contact.cli.reference",
-    "demo": "contact.cli.solve",
-    "schema": "contact.cli.reference",
+    "new": "contact.cli.new:run_new",
+    "mesh": "contact.cli.new:run_mesh",
+    "check": "contact.cli.check:run",
+    "solve": "contact.cli.solve:run_solve",
+    "sweep": "contact.cli.solve:run_sweep",
+    "plot": "contact.cli.plot:run_plot",
+    "view": "contact.cli.plot:run_view",
+    "identify": "contact.cli.identify:run",
+    "materials": "contact.cli.reference:run",
+    "demo": "contact.cli.solve:run_demo",
+    "schema": "contact.cli.reference:run",
 }
 
 
@@ -70,8 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 petsc4py.init([sys.argv[0], *petsc])
                 # PETSc would call it a crash that a reader, such as head, has seen enough.
                 signal.signal(signal.SIGPIPE, signal.SIG_IGN)
-                command = import_module(COMMANDS[options.command])
-            status = int(command.run(options, comm))
+                command = resolve_name(COMMANDS[options.command])
+            status = int(command(options, comm))
             sys.stdout.flush()  # it has been read: else it is a broken pipe
             return status
     except BrokenPipeError:

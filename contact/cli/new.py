@@ -53,12 +53,7 @@ mu = 0.2
 """
 
 
-def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
-    """Write the file that is asked for."""
-    return {"new": _new, "mesh": _convert}[options.command](options, comm)
-
-
-def _convert(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+def run_mesh(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     """Write a mesh file as one that many ranks read in shares."""
     to = Path(options.to)
 
@@ -75,7 +70,7 @@ def _convert(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     return CONVERGED
 
 
-def _new(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+def run_new(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     """Write the case file."""
     mesh = Path(options.mesh)
     path = Path(options.case) if options.case else mesh.with_suffix(".toml")
@@ -218,17 +213,14 @@ def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
 
 
 def _least_gap(one: _Side, other: _Side, reach: float) -> float:
-    """Return the least gap along the normals of the facets of a side; infinity of none that face.
-
-    Each facet is held against the nearest one of the other side. Those that look away from each
-    other have the cells of both bodies between them; an overlap is less than half of that.
-    """
+    """Return the least gap along the normals of the facets of a side; infinity if none face."""
     nearest = cKDTree(other.middle).query(one.middle)[1]
     way = other.middle[nearest] - one.middle
     gap = np.einsum("fd,fd->f", way, one.normal)
     beside = np.linalg.norm(way - gap[:, None] * one.normal, axis=1)
     facing = np.einsum("fd,fd->f", one.normal, other.normal[nearest]) < OPPOSED
     facing &= beside <= one.size + other.size[nearest]
+    # Facets that look away from each other have the cells of both bodies between them.
     facing &= (abs(gap) <= reach) & (gap > -(one.height + other.height[nearest]) / 2)
     return float(gap[facing].min(initial=np.inf))
 

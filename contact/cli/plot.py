@@ -27,11 +27,14 @@ _LENGTH = re.compile(r"(\d+(?:\.\d*)?)\s*(mm|cm|in)")
 _INCHES = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0}
 
 
-def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
-    """Draw the figures on rank 0 and name their files, or open a window."""
-    if options.command == "view":
-        on_root(comm, lambda: show(Path(options.folder), options.field))
-        return CONVERGED
+def run_view(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    """Open a window with the body on rank 0."""
+    on_root(comm, lambda: show(Path(options.folder), options.field))
+    return CONVERGED
+
+
+def run_plot(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    """Draw the figures on rank 0 and name their files."""
     formats = [text.strip() for text in options.format.split(",")]
     for text in formats:
         if text not in FORMATS:

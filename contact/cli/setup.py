@@ -84,11 +84,7 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
 
 
 def _parts(case: Case, problem: ContactProblem) -> Iterator[Part]:
-    """Yield the parts, each with its facets and its load on this rank. Collective.
-
-    Loads are those at the end of the first stage, without their amplitudes; forces are spread
-    over their parts, as tractions are given.
-    """
+    """Yield the parts, with facets and load at the end of the first stage here. Collective."""
     domain = problem.domain
     time = 1.0 if case.evolution is None else case.evolution.times[1]
 
@@ -152,10 +148,7 @@ def _corners(domain: Domain, facets: Indices) -> Array:
 
 
 def _foundation(problem: ContactProblem) -> Array:
-    """Return contact nodes, where they meet rigid foundations, and normals, (m, 3, d). Collective.
-
-    The normals are those to the foundation.
-    """
+    """Return contact nodes, their places on foundations, and normals, (m, 3, d). Collective."""
     found: list[Array] = [np.zeros((0, 3, problem.dim))]
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
         nodes = geometry.nodes
@@ -177,10 +170,7 @@ def _in_front(boundary: Array, surface: Array) -> tuple[Array, Array]:
 
 
 def _arrows(parts: list[Part], boundary: Array) -> list[tuple[Array, Array]]:
-    """Return starts and steps of the arrows of each part: of those on a boundary outside the body.
-
-    Loads on parts have one scale, so have displacements, and so have loads in the whole body.
-    """
+    """Return starts and steps of the arrows of each part, one scale for each kind of vector."""
     reach = REACH * np.ptp(boundary, axis=(0, 1)).max()
     largest: dict[tuple[str, int], float] = {}
     kinds = [(words.partition(" ")[0], min(len(facets), 1)) for words, facets, *_ in parts]
@@ -206,10 +196,7 @@ def _arrows(parts: list[Part], boundary: Array) -> list[tuple[Array, Array]]:
 
 
 def _spread(places: Array, count: int) -> tuple[Indices, Array]:
-    """Return the centres of those cells of a grid that have places, and the nearest of these.
-
-    `count` cells lie along the longest side of the grid.
-    """
+    """Return places spread over a grid of `count` cells along its longest side, and the cells."""
     if not len(places):
         return np.empty(0, dtype=np.int32), places
     low, extent = places.min(axis=0), np.ptp(places, axis=0)

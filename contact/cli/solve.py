@@ -43,19 +43,15 @@ from contact.writing import write_outputs
 DEMO = Path(__file__).parents[1] / "cases" / "bar.toml"
 
 
-def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
-    """Solve the case, or sweep over it, and return the exit status. Collective."""
-    return {"solve": _solve, "sweep": _sweep, "demo": _demo}[options.command](options, comm)
-
-
-def _demo(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+def run_demo(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     """Solve the example that comes with the package."""
     options.case, options.out = DEMO, options.out or "contact-demo"
     options.plot, options.restart = True, None
-    return _solve(options, comm)
+    return run_solve(options, comm)
 
 
-def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+def run_solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    """Solve the case, and write the results. Collective."""
     case = on_root(comm, lambda: _load(options))
     out = options.restart if options.out is None else options.out
     if not out:  # the present folder is "."; this is rather a variable that is not set
@@ -188,7 +184,8 @@ def _check_results(folder: Path, case: Case) -> None:
         check_same(where, "a folder with checkpoints", kept, to_toml(case, anchored=True), accepted)
 
 
-def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+def run_sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    """Solve the case for several values of its keys. Collective."""
     if not options.over:
         raise InputError("--over: missing; accepted: --over KEY=V1,V2,...", "missing")
     if not options.out:
