@@ -36,6 +36,9 @@ STEPS = 200
 #: Most points at which normals are checked.
 CHECKED = 50
 
+#: The description of the key `shape`.
+NAME = Field(description="Name of the shape, by which the case file selects it.")
+
 
 class Obstacle(Protocol):
     """A rigid obstacle, seen from the contact nodes: a new shape is a class with these three."""
@@ -266,8 +269,7 @@ class Plane(Shape):
     """A point of the plane."""
     normal: Direction
     """Normal towards the body, of any length."""
-    shape: Literal["plane"] = field(default="plane", kw_only=True)
-    """Name of the shape, by which the case file selects it."""
+    shape: Annotated[Literal["plane"], NAME] = field(default="plane", kw_only=True)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""
@@ -286,8 +288,7 @@ class Sphere(Shape):
     """Radius."""
     inside: Switch = False
     """Whether the body lies inside the sphere."""
-    shape: Literal["sphere"] = field(default="sphere", kw_only=True)
-    """Name of the shape, by which the case file selects it."""
+    shape: Annotated[Literal["sphere"], NAME] = field(default="sphere", kw_only=True)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""
@@ -342,8 +343,7 @@ class Cylinder(AboutAxis):
     """Radius."""
     inside: Switch = False
     """Whether the body lies in the bore."""
-    shape: Literal["cylinder"] = field(default="cylinder", kw_only=True)
-    """Name of the shape, by which the case file selects it."""
+    shape: Annotated[Literal["cylinder"], NAME] = field(default="cylinder", kw_only=True)
 
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals; NaN on the axis itself."""
@@ -364,8 +364,7 @@ class Cone(AboutAxis):
         float, Gt(0), Lt(90), Accepted("an angle between 0 and 90 degrees, both excluded")
     ]
     """Between the axis and the side (degrees)."""
-    shape: Literal["cone"] = field(default="cone", kw_only=True)
-    """Name of the shape, by which the case file selects it."""
+    shape: Annotated[Literal["cone"], NAME] = field(default="cone", kw_only=True)
 
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals; those of the tip where it is nearest."""
@@ -393,8 +392,7 @@ class Paraboloid(AboutAxis):
     """From the tip into the paraboloid, of any length."""
     radius: Positive
     """Radius of curvature R at the tip."""
-    shape: Literal["paraboloid"] = field(default="paraboloid", kw_only=True)
-    """Name of the shape, by which the case file selects it."""
+    shape: Annotated[Literal["paraboloid"], NAME] = field(default="paraboloid", kw_only=True)
 
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals, by the cubic equation of the nearest point.
@@ -429,8 +427,7 @@ class Punch(AboutAxis):
     """Radius of the punch."""
     edge_radius: NonNegative = 0.0
     """Radius by which its edge is rounded, at most that of the punch; 0: sharp."""
-    shape: Literal["punch"] = field(default="punch", kw_only=True)
-    """Name of the shape, by which the case file selects it."""
+    shape: Annotated[Literal["punch"], NAME] = field(default="punch", kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse an edge that is rounder than the punch."""
@@ -464,8 +461,7 @@ class Level(Shape):
     function: Annotated[FormulaOrFunction, Field(alias="distance")]
     """Signed distance, positive outside. Where its slope is not 1 it is divided by that, which
     is exact on the surface, and nearly so close to it."""
-    shape: Literal["distance"] = field(default="distance", kw_only=True)
-    """Name of the shape, by which the case file selects it."""
+    shape: Annotated[Literal["distance"], NAME] = field(default="distance", kw_only=True)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals; NaN where the function has no slope."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from contact.arguments import expect, naming, one_of
 from contact.errors import InputError
 from contact.model.data import read_data
-from contact.model.obstacle.shapes import Shape
+from contact.model.obstacle.shapes import NAME, Shape
 from contact.model.section import File, as_given, as_tuple, described
 from contact.settings import MISSING, Accepted, Internal, Number, Positive, Switch, fault
 from contact.tolerances import NEGLIGIBLE
@@ -54,8 +54,7 @@ class Heights(Shape):
         Accepted("numbers, one per direction of the array"),
     ] = None
     """Place of the first point of an array. Default: zeros."""
-    shape: Literal["heights"] = field(default="heights", kw_only=True)
-    """Name of the shape, by which the case file selects it."""
+    shape: Annotated[Literal["heights"], NAME] = field(default="heights", kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse heights that are given in no way, or in two; and those that are no grid."""
@@ -192,8 +191,7 @@ class Triangles(Shape):
     """Shape (m, 3, 3), none degenerate. Or a file:"""
     file: Annotated[File | None, Accepted("an STL file")] = None
     """STL file, binary or text, its normals towards the body. Relative to the case file."""
-    shape: Literal["surface"] = field(default="surface", kw_only=True)
-    """Name of the shape, by which the case file selects it."""
+    shape: Annotated[Literal["surface"], NAME] = field(default="surface", kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse a surface that is given in no way, or in two."""
@@ -202,10 +200,7 @@ class Triangles(Shape):
 
     @cached_property
     def _polydata(self) -> Any:
-        """The surface as a pyvista.PolyData of triangles, each vertex once.
-
-        Corners closer than 2^-20 of the size are one vertex: STL has single precision.
-        """
+        """The surface as a pyvista.PolyData of triangles, each vertex once."""
         import pyvista
 
         if self.corners is None:
@@ -215,6 +210,7 @@ class Triangles(Shape):
             corners = self.corners.reshape(-1, 3).astype(np.float64)
             vertex = np.arange(len(corners)).reshape(-1, 3)
             made = pyvista.PolyData.from_regular_faces(corners, vertex)
+        # STL has single precision.
         made = made.clean(tolerance=np.abs(made.points).max() / 2**20, absolute=True)
         a, b, c = made.points[made.regular_faces].swapaxes(0, 1)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
