@@ -25,12 +25,7 @@ MANNER = frozenset({"title", "case", "solver", "output"})
 
 
 def digest(case: Case) -> dict[str, str]:
-    """Return the SHA-256 of each file that a case reads. On one rank.
-
-    The keys are those of the files (``mesh.file``, ``contact.foundation.file``,
-    ``material.0.library``), with the name of a file that a mesh file refers to
-    (``mesh.file/part.h5``). InputError if a file cannot be read.
-    """
+    """Return the SHA-256 of the files that a case reads, by their keys. On one rank."""
     given = [(key, Path(value)) for key, value in walk(case) if isinstance(value, FilePath)]
     for key, material in case.materials:
         if material.name is not None and material.library is None:
@@ -54,10 +49,7 @@ def digest(case: Case) -> dict[str, str]:
 
 
 def check_files(where: str, made: str, before: Mapping[str, str], now: Mapping[str, str]) -> None:
-    """Refuse, by an InputError, to continue results that were made from other files.
-
-    `where` and `made` are words for the message, `before` and `now` the digests of then and now.
-    """
+    """Refuse to continue results that were made from other files, by digests of then and now."""
     for key in (*before, *now):
         if before.get(key) != now.get(key):
             raise InputError(
@@ -75,12 +67,7 @@ def check_same(
     accepted: str,
     ignored: frozenset[str] = MANNER,
 ) -> None:
-    """Refuse, by an InputError, to replace or continue files of another case. On one rank.
-
-    The cases of the files, `before`, and at hand are given as `contact check` prints them; the
-    `ignored` sections may differ. Words for the message are `where`, option and folder, `found`,
-    the files there, and `accepted`, the ways out.
-    """
+    """Refuse to replace or continue `found`, files of a case `before`, if it is another."""
     said = "that do not say of which case they are"
     with suppress(ValueError, RecursionError):
         tables = [tomllib.loads(before if isinstance(before, str) else "="), tomllib.loads(case)]

@@ -353,11 +353,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def to_toml(case: Case, dimension: int | None = None, anchored: bool = False) -> str:
-    """Return a case file that gives the same case again, without the keys that its method ignores.
-
-    Keys without effect in the dimension of the mesh, if it is known, are left out. If `anchored`,
-    files are given with their whole paths, for a case that is read from anywhere.
-    """
+    """Return a file of the same case, without keys of no effect; `anchored`: with whole paths."""
     ignored = {"space": {"kinematics"}} if dimension == 3 else None
     context = {"path": os.path.abspath} if anchored else None
     data = case.model_dump(by_alias=True, exclude_none=True, exclude=ignored, context=context)

@@ -89,10 +89,7 @@ class Adapt(Section):
 
 
 def cut_about_axis(given: Any) -> Any:
-    """Cut the squares of a body of revolution of degree 1 at its axis by both diagonals.
-
-    With those of one way pressures next to the axis are off (`scripts.studies.pressure_on_axis`).
-    """
+    """Cut squares at an axis by both diagonals: `scripts.studies.pressure_on_axis` says why."""
     if not isinstance(given, Mapping):
         return given
     mesh, space = given.get("mesh"), given.get("space")
@@ -229,10 +226,7 @@ class Mesh(Section):
         return self.origin, self.size, self.cells, self.parts
 
     def build(self, comm: MPI.Intracomm) -> Domain:
-        """Make the mesh with its parts. Collective.
-
-        InputError if a file or generator gives no mesh, or if it does not fit into the memory.
-        """
+        """Make the mesh with its parts. Collective."""
         read = None if self.sides else self._read(comm)
         dim = len(self.sides) // 2 if read is None else read.dim
         cells = self._planned if read is None else read.mesh.topology.index_map(dim).size_global

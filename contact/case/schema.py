@@ -20,11 +20,7 @@ LENGTH = {"type": "number", "exclusiveMinimum": 0}
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON schema of the case file.
-
-    It knows keys, kinds of values and bounds. `contact check` knows the rest: keys that are read
-    with some values of others alone, and whatever depends on the mesh.
-    """
+    """Return the JSON schema of the case file: its keys, kinds of values and bounds."""
     with warnings.catch_warnings():  # defaults that are formulas, which JSON does not have
         warnings.simplefilter("ignore", PydanticJsonSchemaWarning)
         made = Case.model_json_schema()

@@ -154,11 +154,7 @@ def _locking(problem: ContactProblem) -> list[str]:
 
 
 def quality(shape: Shape, corners: Array) -> Array:
-    """Return the mean ratio of cells, the least at their corners: 1 if regular, 0 if flat.
-
-    It is d det(A)^(2/d) / |A|^2, A the map from the regular cell of the shape (Knupp, SIAM J. Sci.
-    Comput. 23, 2001).
-    """
+    """Return d det(A)^(2/d) / |A|^2, least at corners, A from the regular cell (Knupp, 2001)."""
     d, jacobian = shape.dim, jacobians(shape, corners[:, : shape.corners], shape.nodes(1))
     if shape.simplex:  # its edges from one corner: W^T W = (1 + I) / 2
         regular = np.linalg.cholesky((1 + np.eye(d)) / 2).T

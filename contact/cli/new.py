@@ -96,10 +96,7 @@ def run_new(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 
 
 def case_text(domain: Domain, mesh: Path, path: Path) -> str:
-    """Return a case that presses the highest part down onto the lowest one. Collective.
-
-    Of several bodies that face each other onto each other, the lowest part held.
-    """
+    """Return a case that presses the highest part, or bodies onto each other, down. Collective."""
     heights, facing, d = _heights(domain), facing_parts(domain), domain.dim
     sides = {side for _, *pair in facing for side in pair}
     order = sorted({*heights} - sides, key=lambda name: (heights[name], name))
@@ -187,11 +184,7 @@ class _Side(NamedTuple):
 
 
 def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
-    """Guess pairs of parts of different bodies that face each other, nearest first. Collective.
-
-    Each has its least gap (length), below 0 where the bodies overlap, and the finer side is the
-    first of a pair. Parts that belong to several bodies are left out.
-    """
+    """Return gaps and pairs of parts that face each other, the finer side first. Collective."""
     space = fem.functionspace(domain.mesh, ("Lagrange", 1))
     labels, count = distributed_components(space, space.dofmap.list)
     if count == 1:

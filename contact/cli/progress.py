@@ -33,11 +33,7 @@ def progress(
     log: str | None = None,
     over: str = OUTER,
 ) -> Iterator[Monitor | None]:
-    """Show the log of ``contact`` on rank 0 and yield the monitor that shows the iterations.
-
-    Iterations are shown as a table, and the steps or cases that a run is `over` as lines; if
-    `quiet` warnings alone. All records are written, with the time, to the end of a `log`.
-    """
+    """Show iterations, steps or cases on rank 0, as `over` says, and yield their monitor."""
     handlers: list[logging.Handler] = [logging.NullHandler()] if comm.rank > 0 else []
     on_root(comm, lambda: handlers.append(_log(log)) if log is not None else None)
     monitor = None

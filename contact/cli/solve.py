@@ -105,10 +105,7 @@ def solve_and_keep(
     folder: Path,
     restart: Path | None = None,
 ) -> Solution:
-    """Solve a case; one with load steps leaves a checkpoint of each in a folder. Collective.
-
-    `restart` is a folder with checkpoints of the same case, to continue from.
-    """
+    """Solve a case, from checkpoints in `restart`; each load step leaves one. Collective."""
     if case.evolution is None or case.adapt is not None:
         return solve(case, monitor=monitor, comm=comm)
     clock = time.perf_counter()

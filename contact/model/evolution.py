@@ -76,10 +76,7 @@ class Amplitude(Described):
 
 
 def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the first two columns of a CSV file with a row of names, two numbers each at least.
-
-    InputError if the file cannot be read, has no such columns, or if its times do not increase.
-    """
+    """Return the first two columns of a CSV file with a row of names, two numbers each at least."""
     columns = [*read_data(path).values()][:2]
     if len(columns) < 2 or len(columns[0]) < 2 or not np.isfinite(columns).all():
         accepted = "a row of names, then two rows or more of a finite time and value"

@@ -31,10 +31,7 @@ GivenAmplitude: TypeAlias = Factor | Literal["constant"]
 
 @dataclass(frozen=True)
 class Ramp:
-    """The factor of given values without an amplitude: from 0 to 1 over the first stage, then 1.
-
-    `begin` and `end` are those of the stage; a static problem is one step from time 0 to time 1.
-    """
+    """The factor of values without an amplitude: 0 to 1 over the first stage, then 1."""
 
     begin: float = 0.0
     end: float = 1.0
@@ -94,10 +91,7 @@ CONSTANT = "constant"
 
 
 def amplitude_of(given: Factor | str | None, known: bool) -> Factor:
-    """Return the amplitude of values where none may be given: a `Ramp` by default.
-
-    Of values some of which are `known` functions of time themselves it is `steady`.
-    """
+    """Return the given amplitude, else `steady` for `known` functions of time, else a `Ramp`."""
     if given is None or isinstance(given, Ramp):
         return steady if known else (given or Ramp())
     assert callable(given)  # a case has names, which `build_problem` exchanges
@@ -112,10 +106,7 @@ def knows_time(fields: Sequence[Field | Moving | None]) -> bool:
 def values_at(
     field: Field | Moving, points: Array, time: float, name: str, comm: MPI.Intracomm
 ) -> Array:
-    """Return a field's values (n,) at points (n, d) and a time. Collective.
-
-    InputError on all ranks, with the name of the field, if a value on one is no finite number.
-    """
+    """Return a field's values (n,) at points (n, d) and a time, finite ones. Collective."""
     with on_all_ranks(comm), naming(name):
         values = at_time(field, time).numpy(points)
         found = real(values, points.shape[:1], "one number for each of the points")

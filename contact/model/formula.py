@@ -120,10 +120,7 @@ class Expression:
         return float(Expression(self.source, time).numpy(np.zeros((1, 3)))[0])
 
     def numpy(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the values, shape (n,), at points, shape (n, 2) or (n, 3).
-
-        InputError if a value is not finite, or z is used in 2-D.
-        """
+        """Return the values, finite ones, (n,), at points, shape (n, 2) or (n, 3)."""
         points = np.asarray(points, dtype=np.float64)
         values = self.values(points)
         bad = np.flatnonzero(~np.isfinite(values))

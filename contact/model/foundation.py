@@ -221,11 +221,6 @@ class Electric(Described):
 
 
 def conduction_ramp(domain: Domain, part: str) -> float:
-    """Return the default width 1/delta of the ramp of psi (length). Collective.
-
-    A tenth of the body's height over its contact part: of a length of the problem, so that
-    refined meshes resolve it and solutions have a limit. A fixed small number of the thesis's
-    delta means a wide ramp too.
-    """
+    """Return the default width 1/delta of psi's ramp, whatever the mesh (length). Collective."""
     height = volume(domain) / area(domain, part)
     return RAMP * min(height, domain.size)

@@ -41,11 +41,7 @@ def either(options: Iterable[str]) -> str:
 
 
 def describe(error: ValidationError, source: str) -> InputError:
-    """Return the error, of a one-line message, for the first mistake of a case.
-
-    An unknown key comes before all else: a missing key or a wrong value elsewhere is often but
-    its consequence.
-    """
+    """Return the first mistake of a case: an unknown key, of which others may be consequences."""
     errors = error.errors(include_url=False)
     made = [_message(e) for e in errors]
     own = [e for e in made if e.identifier == "unknown-key"]
@@ -65,10 +61,7 @@ def _message(error: ErrorDetails) -> InputError:
 
 
 def sections_of(annotation: Any) -> dict[str, type]:
-    """Return the classes that read tables in an annotation, by their names.
-
-    These are sections, and dataclasses (`section.described`).
-    """
+    """Return the sections, and dataclasses that read tables, in an annotation, by their names."""
     if isinstance(annotation, type):
         reads = issubclass(annotation, BaseModel) or is_pydantic_dataclass(annotation)
         return {annotation.__name__: annotation} if reads else {}
@@ -93,10 +86,7 @@ def keys_of(table: Any) -> Mapping[str, FieldInfo]:
 
 
 def kinds_of(sections: Iterable[type]) -> tuple[str, dict[str, type]]:
-    """Return the key that tells sections of one place apart, and its value for each.
-
-    Nothing for sections without such a key: one with a single literal as its value.
-    """
+    """Return the key that tells sections of one place apart by a literal, and its values."""
     found: dict[str, type] = {}
     name = ""
     for section in sections:

@@ -248,10 +248,7 @@ def numbers_at(
     time: float,
     beside: Sequence[float | OfTime | Expression | None] = (),
 ) -> Array:
-    """Return values at a time, 0 for None: times an amplitude, as `amplitude_of` has it.
-
-    They are functions of time if one of them, or of those `beside` them in an entry, has a t.
-    """
+    """Return values at a time, 0 for None, times their amplitude; `beside`: others of the entry."""
     known = any("t" in getattr(value, "names", ()) for value in (*values, *beside))
     numbers = [
         value.number(time) if isinstance(value, Expression | OfTime) else value or 0.0
@@ -261,11 +258,7 @@ def numbers_at(
 
 
 def rigid_motions(points: NDArray[np.floating], revolved: bool = False) -> Array:
-    """Return the rigid motions at points of shape (n, d): shape (n, d, 3 or 6).
-
-    Translations come first, then rotations: about z in 2-D, about x, y and z in 3-D.
-    A body of revolution has one, along its axis: shape (n, 2, 1).
-    """
+    """Return translations, then rotations, at points (n, d): (n, d, 3 or 6 or 1)."""
     n, d = points.shape
     motions = np.zeros((n, d, 3 if d == 2 else 6))
     motions[:, np.arange(d), np.arange(d)] = 1.0

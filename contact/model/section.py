@@ -176,10 +176,7 @@ class Described(Section):
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Bounds, field))
 def described(**options: Any) -> Callable[[type[Kind]], type[Kind]]:
-    """Return a decorator for a frozen dataclass that is made in Python or read from a table.
-
-    Its base may be a dataclass that knows nothing of tables, from which users derive theirs.
-    """
+    """Return a decorator for a frozen dataclass that is made in Python or read from a table."""
 
     def decorate(cls: type[Kind]) -> type[Kind]:
         cls.__get_pydantic_core_schema__ = classmethod(_read_table)  # type: ignore[attr-defined]

@@ -230,11 +230,7 @@ class GapFunction:
 def measured(
     obstacle: Obstacle, points: Array, normal: Array, comm: MPI.Intracomm, key: str
 ) -> tuple[Array, Array]:
-    """Return contact directions, (n, d), and gaps, (n,), by `Obstacle.measure`. Collective.
-
-    InputError on all ranks, with the `key` of the contact, if the obstacle is none in this space,
-    or a function of it fails on one.
-    """
+    """Return contact directions, (n, d), and gaps, (n,), or an error on all ranks. Collective."""
     label, gap_shape = f"{key}.{'foundation' if obstacle.is_shape else 'gap'}", points.shape[:1]
     shape = obstacle if isinstance(obstacle, Shape) else None
     with on_all_ranks(comm):

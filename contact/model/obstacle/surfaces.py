@@ -276,10 +276,7 @@ class Triangles(Shape):
 
 
 def read_stl(path: str | Path) -> Any:
-    """Return the triangles of an STL file as pyvista.PolyData in double precision.
-
-    InputError if the file cannot be read, has no triangles, or coordinates that are no numbers.
-    """
+    """Return the triangles of an STL file as pyvista.PolyData in double precision."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
