@@ -13,7 +13,7 @@ from pydantic import Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from contact.arguments import expect, one_of
 from contact.errors import shown
-from contact.mesh.domain import Domain, meet
+from contact.mesh.domain import Domain
 from contact.model.body import ZERO
 from contact.model.fields import Static
 from contact.model.formula import Expression
@@ -208,8 +208,6 @@ class Contact(Described):
             if given[one] is not None and given[other] is not None:
                 key = other if other == "rigid" else one
                 raise fault(key, Words(f"both {one} and {other}"), "one of them", "exclusive-keys")
-        fits = self.against is None or not meet(self.against, self.on)
-        self.require(fits, "against", "another part than `on`")
         fits = self.direction == "foundation" or isinstance(shape, Shape | None)
         self.require(fits, "direction", "that of a Shape; others have their own")
         fits = self.foundation is not None or self.axis is None
