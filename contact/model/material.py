@@ -297,14 +297,10 @@ class Material(Described):
         fits = factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))
         expect("factor", factor, "a material without coupling and internal variables", fits)
 
-    @property
+    @cached_property
     def law(self) -> Law:
         """The law of the stress; of a crystal by its constants about its own axes."""
-        return self._about_x3 if isinstance(self.kind, str | None) else self.kind
-
-    @cached_property
-    def _about_x3(self) -> Law:
-        return self._law(np.eye(3))
+        return self._law(np.eye(3)) if isinstance(self.kind, str | None) else self.kind
 
     @property
     def piezo(self) -> PiezoTensors | None:
