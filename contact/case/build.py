@@ -144,7 +144,10 @@ def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
             section = Material(law, section.in_body(domain.dim).piezo, section.on or ())
         check_range(f"{key}.young", float(section.law.young))
         thin = case.space.kinematics == "plane_stress"
-        made.append(section.plane_stress() if thin else section)
+        try:
+            made.append(section.plane_stress() if thin else section.in_body(domain.dim))
+        except InputError as error:
+            raise error.within(f"{key}.") from None
     return made
 
 

@@ -443,8 +443,8 @@ class Material(Described):
         # With a nonlinear law the strain across would have to follow the electric field.
         if not (own.piezo is None or own.in_plane_stress or is_linear(own.law)):
             raise InputError(
-                "material: plane stress of a nonlinear law with piezoelectric constants; accepted: "
-                "a linear or anisotropic law with them",
+                "piezo: given with a nonlinear law in plane stress; accepted: a linear or "
+                "anisotropic law",
                 "plane-stress",
             )
         law, piezo = in_plane_stress(own.law, own.piezo)
