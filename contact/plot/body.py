@@ -52,12 +52,7 @@ def vicinity(run: Run) -> Array | None:
 
 
 def scalar(run: Run, field: str) -> tuple[Array, bool]:
-    """Return a scalar field of the body, and whether its values are those of the cells.
-
-    Derived fields are taken as they are in cells of degree 1, and averaged at the nodes of
-    others. ``displacement``, ``stress``... are the lengths of these vectors and tensors, and
-    ``displacement_y``, ``stress_xy``... their components.
-    """
+    """Return a scalar field, component or norm, and whether it is cell by cell, as at degree 1."""
     at_points, in_cells = run.body.point_data, run.body.cell_data
     if field in in_cells:
         return np.asarray(in_cells[field]), True
@@ -82,36 +77,18 @@ def scalar(run: Run, field: str) -> tuple[Array, bool]:
 
 @dataclass(frozen=True)
 class Picture:
-    """The deformed body of a run, coloured by a field.
-
-    Attributes
-    ----------
-    run
-        The run.
-    body, skin
-        The deformed body and its surface, meshes of pyvista with ``values``.
-    norm, label
-        Range and label of the colours.
-    scale, box
-        Factor of the displacements, and the corners of the part that is shown, shape (2, d).
-    look
-        The choices for the figure.
-    near
-        Corners of the vicinity that has decided on the scale, shape (2, d); None for all.
-    classes
-        Names of the values 0, 1, ..., where these are no quantity.
-    """
+    """The deformed body of a run, coloured by a field."""
 
     run: Run
-    body: Any
-    skin: Any
-    norm: Normalize
-    label: str
-    scale: float
-    box: Array
+    body: Any  #: the deformed body with its ``values``, a grid of pyvista
+    skin: Any  #: its surface, likewise
+    norm: Normalize  #: range of the colours
+    label: str  #: of the colours
+    scale: float  #: factor of the displacements
+    box: Array  #: corners of the part that is shown, shape (2, d)
     look: Look = PAGE
-    near: Array | None = None
-    classes: Sequence[str] = ()
+    near: Array | None = None  #: corners of a small contact zone's vicinity, if that is shown
+    classes: Sequence[str] = ()  #: names of the values 0, 1, ..., where these are no quantity
 
     @property
     def title(self) -> str:
@@ -136,10 +113,7 @@ class Picture:
 
 
 def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE) -> Picture:
-    """Return a picture of the body, with colours for the part of it that is shown.
-
-    By default scale and part are those of the body, or of a small contact zone's vicinity.
-    """
+    """Return a picture of the body; without a scale that of a small contact zone's vicinity."""
     values, in_cells = scalar(run, field)
     near = None
     if scale is None:

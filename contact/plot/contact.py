@@ -29,11 +29,9 @@ BESIDE = 3
 
 
 def position(table: Table, run: Run) -> tuple[Array, str, tuple[float, float]]:
-    """Return the positions of nodes along Gamma_3, the label of the axis, and where Gamma_3 ends.
-
-    Positions are those on the coordinate over which Gamma_3 is a graph, of two that along which it
-    is longer, and the arc length elsewhere.
-    """
+    """Return the positions of nodes along Gamma_3, the label of the axis, and its ends."""
+    # On the coordinate over which it is a graph, of two the one along which it is longer; else the
+    # arc length.
     points, outer = np.column_stack([table["x"], table["y"]]), ends(table, run.held)
     extent = np.ptp(points, axis=0)
     for axis in (0, 1) if extent[0] >= extent[1] else (1, 0):
@@ -71,11 +69,7 @@ def shown(table: Table, run: Run, touching: NDArray[np.bool_]) -> tuple[float, f
 
 
 def ends(table: Table, held: Array) -> Array:
-    """Return the first and the last point of Gamma_3 in 2-D, shape (2, 2).
-
-    They are those of the contact nodes, given in their order, or nodes beside them that are held
-    and hence no contact nodes, shape (n, 2).
-    """
+    """Return the ends of Gamma_3, (2, 2): contact nodes, or held ones, (n, 2), beside these."""
     points = np.column_stack([table["x"], table["y"]])
     found = points[[0, -1]]
     if len(held) and len(points) > 1:
@@ -93,10 +87,7 @@ def shares(where: Array, outer: tuple[float, float]) -> Array:
 
 
 def zones(ax: Axes, where: Array, outer: tuple[float, float], status: Any, rows: Array) -> None:
-    """Colour the share of each node by its status, shape (m, n), in rows with m + 1 ends.
-
-    Those of one row are shares of the axis.
-    """
+    """Colour the share of each node by its status, (m, n); `rows` has m + 1 ends, of one shares."""
     order = np.argsort(where)
     ax.pcolormesh(
         shares(where, outer),

@@ -38,13 +38,7 @@ class Gallery(dict[str, Figure]):
 
 
 def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Gallery:
-    """Return the figures of a run by name.
-
-    In 2-D the contact figure shows the stresses along Gamma_3 with the friction bound and the zones
-    of stick and slip, as Figure 7.4 of the thesis does. In 3-D it shows the body from where its
-    contact is seen, and pressure, status and friction along the mean normal of the contact. With
-    `fields` the body is drawn alone, coloured by each of them.
-    """
+    """Return the figures of a run by name; with `fields` the body alone, coloured by each."""
     if run.plane and look.view is not None:
         raise flat("--view")
     found = Gallery()

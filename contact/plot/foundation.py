@@ -40,23 +40,14 @@ class Scaling:
     """The distances h + (s - 1) f at which a foundation is drawn beside displacements times s.
 
     With a constant f it keeps its shape, and is shifted to where the body first touches it. With
-    f = h its profile is magnified as the displacements are. No magnified gap fits a plane to a
-    magnified round body: that is for straight parts alone.
-
-    Attributes
-    ----------
-    approach
-        Displacements of the body towards it, shape (n,).
-    distance, more
-        h and f, shape (n,).
-    largest
-        The scale up to which bodies do not overlap it visibly, and it is shallow.
+    f = h its profile is magnified too: of straight parts alone, for no magnified gap fits a plane
+    to a magnified round body.
     """
 
-    approach: Array
-    distance: Array
-    more: Array
-    largest: float
+    approach: Array  #: displacements of the body towards it, shape (n,)
+    distance: Array  #: h, shape (n,)
+    more: Array  #: f, shape (n,)
+    largest: float  #: the scale up to which bodies do not overlap it visibly, and it is shallow
 
     @staticmethod
     def of(
@@ -71,10 +62,7 @@ class Scaling:
 
 
 def scalings(run: Run, table: Table, box: Array | None) -> list[Scaling]:
-    """Return how the foundation of a contact may be drawn, the best first; also the other body.
-
-    The box has the corners of the part that is shown, shape (2, d); None for all.
-    """
+    """Return how a foundation, or other body, may be drawn in a box, (2, d), the best first."""
     points = np.column_stack([table[axis] for axis in "xyz"[: len(run.axes)]])
     seen, diameter = np.ones(len(points), dtype=bool), run.diameter
     if box is not None:
@@ -96,8 +84,7 @@ def scalings(run: Run, table: Table, box: Array | None) -> list[Scaling]:
 def magnification(run: Run, box: Array | None = None) -> float:
     """Return 1, 2 or 5 times a power of ten that makes displacements about 5 % of a diameter.
 
-    Displacements that are visible anyway are drawn as they are. Bodies do not overlap each other or
-    their foundation, whose gap a displacement would close many times over. Box as in `scalings`.
+    At most as much as leaves bodies without overlap. Visible displacements stay as they are.
     """
     diameter = run.diameter if box is None else float(np.ptp(box, axis=0).max())
     largest = float(np.linalg.norm(run.displacement, axis=1).max())
@@ -114,25 +101,14 @@ def magnification(run: Run, box: Array | None = None) -> float:
 
 @dataclass(frozen=True)
 class Profile:
-    """A foundation as it is drawn beside a deformed body in 2-D.
+    """A foundation as it is drawn beside a deformed body in 2-D."""
 
-    Attributes
-    ----------
-    points, normal
-        Points that face the nodes of Gamma_3, and the directions from those to them, shape (n, 2).
-    gap
-        Their distances from the deformed body, shape (n,).
-    """
-
-    points: Array
-    normal: Array
-    gap: Array
+    points: Array  #: those that face the nodes of Gamma_3, shape (n, 2)
+    normal: Array  #: directions from the nodes to them, shape (n, 2)
+    gap: Array  #: their distances from the deformed body, shape (n,)
 
     def reach(self, box: Array) -> Array:
-        """Return a box, shape (2, 2), that shows the foundation in front of the part in it too.
-
-        Not all of one that is large.
-        """
+        """Return a box, shape (2, 2), that shows the foundation in front of the part in it too."""
         size = float(np.ptp(box, axis=0).max())
         body, room = self.points - self.gap[:, None] * self.normal, BEYOND * size
         least, most = box[0] - room * abs(self.normal), box[1] + room * abs(self.normal)
@@ -153,11 +129,7 @@ class Profile:
 
 
 def profiles(run: Run, scale: float, places: Array, box: Array | None) -> list[Profile]:
-    """Return the foundations of a run in 2-D, as far as they face the body.
-
-    Not one that is farther from the deformed body, given by its points, than that is thick: that
-    would be a dot then.
-    """
+    """Return the foundations of a run in 2-D that are near the points of the deformed body."""
     found = []
     for table in run.contacts:
         if not np.all(table["rigid"]):
@@ -169,7 +141,7 @@ def profiles(run: Run, scale: float, places: Array, box: Array | None) -> list[P
         points = np.column_stack([table["x"], table["y"]])
         normal = np.column_stack([table["nu_x"], table["nu_y"]])
         across = normal.mean(axis=0) / (np.linalg.norm(normal.mean(axis=0)) or 1.0)
-        if gap.min() > np.ptp(places @ across) > 0:
+        if gap.min() > np.ptp(places @ across) > 0:  # the body would be a dot beside it
             continue
         # Held nodes beside the first and the last have their distances.
         first, last = ends(table, run.held)
@@ -180,12 +152,7 @@ def profiles(run: Run, scale: float, places: Array, box: Array | None) -> list[P
 
 
 def foundation(run: Run, scale: float) -> Any:
-    """Return rigid shapes in 3-D beside displacements times a scale.
-
-    Shapes that are known (`Run.shapes`) are whole in a box around the contact parts. Of others it
-    has the parts that face the body: the contact facets moved by their gaps, as far as these are
-    not large.
-    """
+    """Return rigid shapes in 3-D: known ones around the contact, of others facets moved by gaps."""
     skin = linear(run.surface)
     row, faces = np.asarray(skin["row"]), skin.regular_faces
     distance, gap = np.full((2, len(run.table["gap"])), np.nan)
@@ -224,17 +191,13 @@ def foundation(run: Run, scale: float) -> Any:
 def _placed(
     shape: Shape, motion: Array, table: Table, more: Array, facets: Array, diameter: float
 ) -> Callable[[Array], Array]:
-    """Return the distances from a shape as it is drawn.
-
-    It has a motion (`Run.motions`), and is farther away by `more`, by a translation as far as the
-    contact directions determine one. It is drawn a little behind the facets of the body, which
-    are chords of a curved surface.
-    """
+    """Return the distances from a moved shape that is drawn farther away by `more`, (n,)."""
     points = np.column_stack([table[axis] for axis in "xyz"])
     normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"])
     lever = np.hstack([normal, np.cross(points, normal)])
     touching = table["status"] != "open"
     near = touching if touching.any() else slice(None)
+    # By a translation, as far as the contact directions determine one.
     farther = np.linalg.lstsq(normal[near], more[near], rcond=1e-3)[0]
     motion = motion + np.concatenate([farther, np.zeros(3)])
     level = float(np.mean(table["moved"][near] + more[near] - lever[near] @ motion))
@@ -243,16 +206,14 @@ def _placed(
         back = places - motion[:3]
         return shape.distance(back - np.cross(motion[3:], back))[0] + level
 
+    # A little behind the facets of the body, which are chords of a curved surface.
     level += float(np.clip(-np.nanmin(distance(facets)), 0.0, 0.01 * diameter))
     level += UNSEEN * diameter
     return distance
 
 
 def _surface(distance: Callable[[Array], Array], box: Array) -> Any:
-    """Return the surface in a box where a distance is 0.
-
-    The distance is sampled on a grid of the box, then on a finer one of the surface found there.
-    """
+    """Return the surface in a box where a distance is 0: on a grid, then on one of that surface."""
     for _ in range(2):
         step = np.ptp(box, axis=0) / (FINE - 1)
         # Beside the round numbers: centres and axes of shapes have no distance.

@@ -32,49 +32,27 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class Run:
-    """The results of a run, or those at the end of one of its steps.
+    """The results of a run, or those at the end of one of its steps."""
 
-    Attributes
-    ----------
-    title
-        One line, to be shown as it is.
-    units
-        Names of the units, for labels.
-    axes
-        Names of the coordinates: xy, rz of a body of revolution, xyz.
-    table
-        The columns of ``contact.csv``, with contact direction ``nu_x``..., number of the contact
-        (``entry``), whether its foundation is rigid (``rigid``), and how far that has moved along
-        the contact direction (``moved``).
-    body, surface, opposite
-        Grids of pyvista: body, contact part, and the other sides of contacts between bodies.
-    regions
-        Names of the regions, in the order of the numbers in the field ``region``.
-    shapes, moving
-        The rigid shapes by the numbers of their contacts, as far as the case has them; of those
-        that move in 3-D, the end of the names of their columns, and the centre of rotation.
-    motions
-        Displacement, and rotation in radians about the origin, of these, shape (6,).
-    step
-        Number of the step that these are the results of, from 1; None for the last results.
-    steps, tables
-        The columns of ``steps.csv``, and the contact nodes of each step, of an evolution.
-    """
-
-    title: str
+    title: str  #: one line, to be shown as it is
     units: Units
-    axes: str
+    axes: str  #: names of the coordinates: xy, rz of a body of revolution, xyz
+    #: Columns of ``contact.csv``, with contact direction (``nu_x``...), number of the contact
+    #: (``entry``), and whether and how far along it its foundation is rigid and has moved
+    #: (``rigid``, ``moved``).
     table: Table
-    body: Any
-    surface: Any
-    opposite: Any = None
-    regions: Sequence[str] = ()
-    shapes: Mapping[int, Shape] = field(default_factory=dict)
+    body: Any  #: a grid of pyvista
+    surface: Any  #: the contact part, likewise
+    opposite: Any = None  #: the other sides of contacts between bodies, likewise
+    regions: Sequence[str] = ()  #: names by the numbers in the field ``region``
+    shapes: Mapping[int, Shape] = field(default_factory=dict)  #: those of the case, by contact
+    #: Of shapes that move in 3-D the end of the names of their columns, and the centre of rotation.
     moving: Mapping[int, tuple[str, Array]] = field(default_factory=dict)
+    #: Their displacement, and rotation in radians about the origin, shape (6,).
     motions: Mapping[int, Array] = field(default_factory=dict)
-    step: int | None = None
-    steps: Table | None = None
-    tables: Sequence[Table] = ()
+    step: int | None = None  #: its number, from 1; None for the last results
+    steps: Table | None = None  #: columns of ``steps.csv``, of an evolution
+    tables: Sequence[Table] = ()  #: the contact nodes of each step
 
     @property
     def plane(self) -> bool:
@@ -128,15 +106,7 @@ def _as_written(folder: Path) -> Iterator[None]:
 
 
 def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
-    """Read the files of a run; of its summary the contents if that is not written yet.
-
-    On one rank.
-
-    Raises
-    ------
-    InputError
-        If the folder has not all that is needed.
-    """
+    """Read the files of a run; of its summary the contents if that is not written yet. One rank."""
     with _as_written(folder):
         about = summary or json.loads((folder / "summary.json").read_bytes())
         surface, body = (read_grid(folder / name) for name in ("contact.vtu", "fields.vtu"))
@@ -166,10 +136,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
 
 
 def _foundations(case: str) -> tuple[dict[int, Shape], dict[int, tuple[str, Array]]]:
-    """Return `Run.shapes` and `Run.moving` of a case; none of one that this version refuses.
-
-    Not the shapes that files describe, which may be elsewhere by now.
-    """
+    """Return `Run.shapes`, but those in files, and `Run.moving`; none of a case that is refused."""
     try:
         tables = tomllib.loads(case).get("contact", [])
         given = tables if isinstance(tables, list) else [tables]

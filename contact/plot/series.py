@@ -57,10 +57,7 @@ ROUNDING = 1e-6
 
 
 def steps_figures(run: Run) -> dict[str, Figure]:
-    """Return the figures of an evolution by name.
-
-    The loop is drawn where a part is driven, and zones in 2-D.
-    """
+    """Return the figures of an evolution by name: a loop of driven parts, zones in 2-D."""
     assert run.steps is not None
     found = {"energy": draw_energies(run)}
     moves = next((m for m in DRIVEN if any(k.startswith(f"{m}_x") for k in run.steps)), None)
@@ -80,10 +77,7 @@ def _course(run: Run, name: str) -> Array:
 
 
 def draw_loop(run: Run, moves: str) -> Figure:
-    """Draw the forces on the parts that move over their displacements, along each axis of these.
-
-    From the origin on: load lines, and loops of shear.
-    """
+    """Draw the forces on the parts that move over their displacements, along each axis of these."""
     assert run.steps is not None
     names = "xyz"[: len(run.axes)]
     bodies = [
@@ -162,21 +156,13 @@ def draw_zones(run: Run) -> Figure:
 
 @dataclass(frozen=True)
 class Swept:
-    """The table of a sweep, with title and units of its case.
+    """The table of a sweep, with title and units of its case."""
 
-    Attributes
-    ----------
-    keys, rows
-        The swept keys, and the rows as texts.
-    title, units, plane
-        Of the case; whether results are those of a unit of thickness.
-    """
-
-    keys: list[str]
+    keys: list[str]  #: the swept ones
     rows: list[dict[str, str]]
     title: str = ""
     units: Units = field(default_factory=Units)
-    plane: bool = False
+    plane: bool = False  #: whether results are those of a unit of thickness
 
     def chosen(self, key: str) -> list[str]:
         """Return the columns of a key: those that vary, if any does."""
@@ -261,11 +247,7 @@ def read_sweep(folder: Path) -> Swept:
 def plot_sweep(
     folder: Path, columns: Sequence[str], formats: Sequence[str], look: Look
 ) -> list[Path]:
-    """Draw ``figure-sweep``, or ``figure-sweep-COLUMN``, from the tables of a sweep; return files.
-
-    By default one figure has the columns of `DRAWN`, and those asked for with ``--columns``, as far
-    as they vary. On one rank.
-    """
+    """Draw ``figure-sweep``, or ``figure-sweep-COLUMN`` each; return the files. On one rank."""
     swept, files = read_sweep(folder), []
     figures = {f"-{name.replace('/', '-')}": swept.chosen(name) for name in columns}
     figures = figures or {"": swept.default}

@@ -35,20 +35,12 @@ SNAPPED = 0.966
 
 @dataclass(frozen=True)
 class Camera:
-    """A parallel projection.
+    """A parallel projection."""
 
-    Attributes
-    ----------
-    right, up
-        Unit vectors of the picture, shape (3,).
-    low, high
-        Corners of the picture along these, shape (2,).
-    """
-
-    right: Array
-    up: Array
-    low: Array
-    high: Array
+    right: Array  #: unit vector of the picture, shape (3,)
+    up: Array  #: likewise
+    low: Array  #: corner of the picture along these, shape (2,)
+    high: Array  #: likewise
 
     @property
     def view(self) -> Array:
@@ -125,10 +117,7 @@ def render(ax: Axes, camera: Camera, add: Callable[[Any], None], pixels: int = 1
 
 
 def triad(ax: Axes, camera: Camera, corner: tuple[float, float], share: float) -> None:
-    """Draw the directions of the coordinates in a square at a corner.
-
-    Its side is a share of the longer side of the picture.
-    """
+    """Draw the coordinate axes in a square at a corner, of a share of the longer side."""
     size = camera.high - camera.low
     inset = ax.inset_axes((*corner, *(share * size.max() / size)))
     inset.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
@@ -167,11 +156,9 @@ FACETS = 8000
 
 
 def areas(run: Run, skin: Any) -> Array:
-    """Return the area vectors of the triangles of a contact part, out of the body.
-
-    Against a rigid shape the contact direction may point into the body; against another body the
-    facets of both may be in one place.
-    """
+    """Return the area vectors of the triangles of a contact part, out of the body, (n, 3)."""
+    # Against a rigid shape the contact direction may point into the body; against another body the
+    # facets of both may be in one place.
     faces, cells = skin.regular_faces, run.body.cell_centers().points
     a, b, c = np.moveaxis(skin.points[faces], 1, 0)
     across = np.cross(b - a, c - a).astype(float) / 2
@@ -183,23 +170,13 @@ def areas(run: Run, skin: Any) -> Array:
 
 @dataclass(frozen=True)
 class Zone:
-    """Where a run is in contact; all of the contact part where it is open.
+    """Where a run is in contact; all of the contact part where it is open."""
 
-    Attributes
-    ----------
-    corners, area
-        The triangles that touch, shape (n, 3, 3), and their area vectors, shape (n, 3).
-    displacement, pressure
-        At the corners, shape (n, 3, 3) and (n, 3).
-    normal
-        The mean normal of a side of it, shape (3,), that of an axis if it is nearly so.
-    """
-
-    corners: Array
-    area: Array
-    displacement: Array
-    pressure: Array
-    normal: Array
+    corners: Array  #: the triangles that touch, shape (n, 3, 3)
+    area: Array  #: their area vectors, shape (n, 3)
+    displacement: Array  #: at the corners, shape (n, 3, 3)
+    pressure: Array  #: at the corners, shape (n, 3)
+    normal: Array  #: mean normal of a side of it, shape (3,), that of an axis if it is nearly so
 
     @property
     def points(self) -> Array:
@@ -239,22 +216,17 @@ class Zone:
 class Sight(NamedTuple):
     """How a body is seen."""
 
-    #: Direction to the eye, shape (3,).
-    eye: Array
-    #: Which cells are translucent, shape (n,).
-    clear: NDArray[np.bool_]
-    #: Words on it for titles.
-    words: str = ""
-    #: Normal and a point of the plane beyond which the body is cut away, if it is.
-    cut: tuple[Array, Array] | None = None
+    eye: Array  #: direction to the eye, shape (3,)
+    clear: NDArray[np.bool_]  #: which cells are translucent, shape (n,)
+    words: str = ""  #: on it, for titles
+    cut: tuple[Array, Array] | None = None  #: normal and a point of the plane of a cut
 
 
 def chosen_sight(run: Run, zone: Zone, cut: bool = False) -> Sight:
-    """Return how the contact zone of a run is seen.
+    """Return the direction from which most of a zone is seen, aslant to its mean normal.
 
-    The eye is where most of the zone is seen, aslant to its mean normal. Bodies without a part of
-    the zone are translucent, and so is the body with it if it hides the zone from all sides. With
-    `cut` all are cut open instead.
+    Bodies without a part of the zone are translucent, and so is the body with it if it hides the
+    zone from all sides. With `cut` all are cut open instead.
     """
     size = np.linalg.norm(zone.area, axis=1)[:, None]
     places, out = zone.corners.mean(axis=1), zone.area / size
@@ -286,12 +258,9 @@ def chosen_sight(run: Run, zone: Zone, cut: bool = False) -> Sight:
 
 
 def section(run: Run, zone: Zone) -> Sight:
-    """Return the sight of a body that is cut open, through the middle of its contact zone.
-
-    The plane of the cut contains the normal of the zone, and stands across an axis as far as that
-    allows. Where the zone ends at a face of the body, as at a plane of symmetry, nothing is cut
-    away.
-    """
+    """Return the sight of a body cut open through its zone, by a plane across one of the axes."""
+    # The plane contains the normal of the zone. Where the zone ends at a face of the body, as at a
+    # plane of symmetry, nothing is cut away.
     axes = np.eye(3) - np.outer(zone.normal, zone.normal)
     size = np.linalg.norm(axes, axis=1)
     axes = axes[size > 0.5] / size[size > 0.5, None]
@@ -309,27 +278,13 @@ def section(run: Run, zone: Zone) -> Sight:
 
 @dataclass(frozen=True)
 class Scene:
-    """A deformed body in 3-D, as windows and figures show it.
+    """A deformed body in 3-D, as windows and figures show it."""
 
-    Attributes
-    ----------
-    body
-        The grid of the deformed body.
-    zone
-        Where it is in contact.
-    foundation
-        Rigid shapes, drawn translucent.
-    colours
-        Arguments of ``add_mesh`` for the colours of a field.
-    painted
-        Whether the field is the pressure, on the contact zone of a plain body.
-    """
-
-    body: Any
-    zone: Zone
-    foundation: Any
-    colours: Mapping[str, Any]
-    painted: bool = False
+    body: Any  #: its grid
+    zone: Zone  #: where it is in contact
+    foundation: Any  #: rigid shapes, drawn translucent
+    colours: Mapping[str, Any]  #: arguments of ``add_mesh`` for the colours of a field
+    painted: bool = False  #: whether the field is the pressure, on the zone of a plain body
 
     @staticmethod
     def of(run: Run) -> Scene:
@@ -459,11 +414,9 @@ def _legend(run: Run, scene: Scene, frictional: bool) -> list[Patch]:
 
 
 def close_ups(run: Run, zone: Zone) -> list[tuple[Zone, int, str]]:
-    """Return the zones of close-ups, the sides from which they are seen, and their names.
-
-    A few contacts have a close-up each; more have one together, or two if much of the zone is seen
-    from behind its normal alone. The side is 1, or -1 from behind.
-    """
+    """Return the zones of close-ups, 1 or -1 for their front or back, and their names."""
+    # A few contacts have one each; more have one together, or two if much of the zone is seen from
+    # behind its normal alone.
     touching = np.unique(run.table["entry"][run.table["status"] != "open"])
     if 1 < len(touching) <= CLOSE:
         parts = [table for table in run.contacts if table["entry"][0] in touching]
@@ -476,10 +429,7 @@ def close_ups(run: Run, zone: Zone) -> list[tuple[Zone, int, str]]:
 
 
 def close_camera(zone: Zone, side: int, whole: Camera) -> Camera:
-    """Return the camera of a close-up: along the normal, from outside, upwards as the whole is.
-
-    In coordinate planes the axis that is nearest to that direction points upwards.
-    """
+    """Return the camera of a close-up: along the normal, upwards as the whole, or an axis, is."""
     along = side * float(whole.up @ zone.normal)
     above = whole.up - side * along * zone.normal
     if np.linalg.norm(above) < 0.3:  # the body is seen edge-on: as its camera would turn

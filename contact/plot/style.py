@@ -65,17 +65,10 @@ OUTLIERS = (0.005, 0.995)
 
 @dataclass(frozen=True)
 class Look:
-    """Choices for all figures of a run.
+    """Choices for all figures of a run."""
 
-    Attributes
-    ----------
-    width
-        Of the figures (inches); None for that of a page.
-    view
-        Direction from a body in 3-D to the eye; None for one that sees the contact.
-    """
-
-    width: float | None = None
+    width: float | None = None  #: of the figures (inches); None for that of a page
+    #: Direction from a body in 3-D to the eye; None for one that sees the contact.
     view: tuple[float, float, float] | None = None
 
     @property
@@ -137,11 +130,7 @@ POWERS["force · length"] = POWERS["work"]
 
 
 def unit_of(quantity: str, units: Units, plane: bool) -> str:
-    """Return the unit of a quantity in brackets, after a blank; nothing where it has no name.
-
-    The quantity is "length", "stress", ..., one of `POWERS`, or a quotient of two. Of a plane body
-    all is that of a unit of thickness.
-    """
+    """Return " (UNIT)" of "length", of one of `POWERS`, or a quotient; "" where it has no name."""
     if "/" in quantity:
         names = [unit_of(part, units, plane)[2:-1] for part in quantity.split("/")]
         return f" ({'/'.join(names)})" if all(names) else ""
