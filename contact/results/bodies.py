@@ -51,11 +51,9 @@ CONSTRAINED = 1e-8
 
 
 def sides(solution: Solution) -> Iterator[Remark]:
-    """Warn of slave sides that are coarser or stiffer, uncovered in part, or have slid too far.
-
-    Multipliers live on the slave side: it should be the finer and the softer one, else it
-    penetrates the finer side, or carries pressures that the softer side cannot follow.
-    """
+    """Warn of slave sides that are coarser or stiffer, uncovered in part, or have slid too far."""
+    # Multipliers live on the slave side: a coarser one penetrates the finer side, a stiffer one
+    # carries pressures that the softer side cannot follow.
     problem = solution.problem
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
         if contact.against is None or geometry.jumps is None or geometry.covered is None:
@@ -164,10 +162,8 @@ def overlapping(problem: ContactProblem) -> Iterator[Remark]:
 def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     """Warn of rigid-body modes that the supports leave free and contact hardly resists. Collective.
 
-    A cylinder without friction rolls in its place against next to nothing, and wherever it has
-    rolled to, its forces are in balance. Contact is taken to resist with c = E/length times areas:
-    along the normal where something presses, along the surface where it sticks, and across the
-    friction where it slips.
+    Contact is taken to resist with c = E/length times areas: along the normal where something
+    presses, along the surface where it sticks, and across the friction where it slips.
     """
     problem, body = solution.problem, solution.problem.body
     if not solution.converged:
@@ -223,11 +219,7 @@ def _regions(problem: ContactProblem, component: NDArray[np.int32], among: Array
 
 
 def not_held(solution: Solution) -> Iterator[Remark]:
-    """Warn of loads that by limit analysis are more than contact bears, where a method fails.
-
-    A block between two jaws that touch it aslant gets out of their way and falls: no solution.
-    Collective.
-    """
+    """Warn of loads that by limit analysis are more than contact bears, where a method fails."""
     problem, time = solution.problem, solution.state.time
     if solution.converged:
         return
@@ -253,9 +245,8 @@ def not_held(solution: Solution) -> Iterator[Remark]:
 def _least_constrained(
     solution: Solution, group: Group, free: Array, touches: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Return relative stiffnesses of contact along free motions, and these. Collective."""
-    # Ascending: shares of their squares at all contact nodes that are where they are resisted. The
-    # motions, shape (m, k), have mean squares of 1 there.
+    """Return ascending relative stiffnesses along free motions, and these, (m, k). Collective."""
+    # Shares of their squares that are where they are resisted; the mean square of each is 1.
     nodes = group.problem.nodes
     normal, tangential = group.normal @ free, group.tangential @ free
     resisted = tangential.copy()

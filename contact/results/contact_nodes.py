@@ -37,33 +37,17 @@ Table = Mapping[str, Values]
 
 @dataclass(frozen=True)
 class Grid:
-    """Cells with fields, or this rank's share of them.
+    """Cells with fields, or this rank's share of them."""
 
-    Attributes
-    ----------
-    points
-        Coordinates of the nodes, shape (n, d), those of the ranks one rank after the other.
-    cells
-        Nodes of each cell in dolfinx's order, numbered over all ranks, shape (m, nodes a cell).
-    shape
-        Of the cells.
-    at_points, in_cells
-        Fields by name, one row per node or cell.
-    """
-
-    points: Array
-    cells: NDArray[np.int64]
-    shape: Shape
-    at_points: Mapping[str, Values]
-    in_cells: Mapping[str, Values] = field(default_factory=dict)
+    points: Array  #: nodes, shape (n, d), those of the ranks one rank after the other
+    cells: NDArray[np.int64]  #: nodes in dolfinx's order, numbered over all ranks, shape (m, k)
+    shape: Shape  #: of the cells
+    at_points: Mapping[str, Values]  #: fields by name, one row per node
+    in_cells: Mapping[str, Values] = field(default_factory=dict)  #: likewise per cell
 
 
 def tangent_of(normal: Array) -> Array:
-    """Return the unit tangents t of contact directions nu in the plane, shape (n, 2).
-
-    t is nu turned counter-clockwise by 90 degrees: on the bottom of a body, where
-    nu = (0, -1), t points along x.
-    """
+    """Return nu turned counter-clockwise by 90 degrees, (n, 2): x on a bottom, nu = (0, -1)."""
     return np.column_stack([-normal[:, 1], normal[:, 0]])
 
 
@@ -170,8 +154,7 @@ def contact_result(
     gap, normal_displacement = nodes.gap, nodes.normal_component(jump)
     pressure = problem.interface.pressure(jump, forces)
     own: dict[str, NDArray[Any]] = {
-        # Mesh generators leave coordinates such as -3e-19.
-        "points": np.where(np.abs(nodes.points) < 1e-15 * problem.domain.size, 0.0, nodes.points),
+        "points": _clean(problem, nodes.points),
         "weight": nodes.weight,
         "normal": nodes.normal,
         "gap": gap,
@@ -196,6 +179,11 @@ def contact_result(
     order = order[np.argsort(own["entry"][order], kind="stable")]
     arrays: dict[str, Any] = {name: values[order] for name, values in own.items()}
     return ContactResult(**arrays, _problem=problem)
+
+
+def _clean(problem: ContactProblem, points: Array) -> Array:
+    """Return points without coordinates such as -3e-19, which mesh generators leave."""
+    return np.where(np.abs(points) < 1e-15 * problem.domain.size, 0.0, points)
 
 
 def _by_position(problem: ContactProblem, points: Array) -> NDArray[np.intp]:
@@ -274,11 +262,7 @@ def contact_shares(
 
 
 def contact_table(contact: ContactResult) -> Table:
-    """Return the columns of ``contact.csv``, the same on all ranks. Collective.
-
-    In 2-D ``u_t`` and ``tau`` are the components of u_tau and lambda_f = -sigma_tau along
-    `tangent_of` the contact direction; in 3-D they are vectors.
-    """
+    """Return the columns of ``contact.csv``, the same on all ranks."""
     return values_of(NODES, contact)
 
 
@@ -342,13 +326,10 @@ def _at(known: NDArray[np.int64], numbers: NDArray[np.int64], values: Values) ->
 
 
 def opposite_surface(problem: ContactProblem, state: State) -> Grid | None:
-    """Return this rank's share of the parts `against` with the stresses there. Collective.
+    """Return this rank's share of the parts `against`; None if all obstacles are rigid. Collective.
 
-    Multipliers live on the other side. Here the forces int N_l lambda act, which belong to nodes of
-    this one; divided by the areas of these they are stresses again. A constant pressure is the same
-    constant here, and forces are the same on both sides.
-
-    None where all obstacles are rigid.
+    Its stresses are the forces int N_l lambda on its nodes over their areas: a constant pressure is
+    the same constant on both sides.
     """
     body, d = problem.body, problem.dim
     owners = Owners.of(body.layout.index_map, problem.comm)
@@ -399,12 +380,10 @@ def _acting(owners: Owners, jumps: JumpRows, lumped: Lumping, forces: Array) -> 
 
 def opposite_table(problem: ContactProblem, surface: Grid) -> Table:
     """Return the rows of ``contact-against.csv``: nodes with an area, contact by contact."""
-    fields, size = surface.at_points, problem.domain.size
-    # Mesh generators leave coordinates such as -3e-19.
-    points = np.where(np.abs(surface.points) < 1e-15 * size, 0.0, surface.points)
+    fields, points = surface.at_points, _clean(problem, surface.points)
     names = np.array([contact.against or "" for contact in problem.contacts])
     columns = values_of(AGAINST, {"on": names[fields["entry"]], "x": points, **fields})
-    rounded = np.round(points / (1e-9 * size))
-    order = np.lexsort((*rounded.T[::-1], fields["entry"]))
+    order = _by_position(problem, points)
+    order = order[np.argsort(fields["entry"][order], kind="stable")]
     order = order[np.isfinite(columns["pressure"][order])]
     return {name: values[order] for name, values in columns.items()}

@@ -65,28 +65,15 @@ MANDEL = np.array([1.0] * 3 + [np.sqrt(2.0)] * 3)
 
 @dataclass(frozen=True)
 class Estimate:
-    """The estimated discretisation error of a solution.
+    """The estimated discretisation error of a solution."""
 
-    Attributes
-    ----------
-    squares
-        eta_K^2 of the owned cells, shape (cells,) (work).
-    contact
-        The part of their sum that is from the contact.
-    energy
-        The square of the energy norm of the solution, over all ranks.
-    total
-        The sum of eta_K^2 over all ranks.
-    stiffness_ratio
-        Mean of bulk over shear modulus, weighted by the energy, the latter |s|/(2 |e|) of the
-        deviatoric stress and the whole deviatoric strain; of a crystal as of `_of_crystal`. None
-        in plane stress, where volumes are free to change.
-    """
-
-    squares: Array
-    contact: float
-    energy: float
-    total: float
+    squares: Array  #: eta_K^2 of the owned cells, shape (cells,) (work)
+    contact: float  #: the part of their sum that is from the contact
+    energy: float  #: the square of the energy norm of the solution, over all ranks
+    total: float  #: the sum of eta_K^2 over all ranks
+    #: Mean of bulk over shear modulus, weighted by the energy, the latter |s|/(2 |e|) of the
+    #: deviatoric stress and the whole deviatoric strain; of a crystal as of `_of_crystal`. None in
+    #: plane stress, where volumes are free to change.
     stiffness_ratio: float | None
 
     @property
@@ -204,10 +191,7 @@ def _rounding(problem: ContactProblem, state: State, volume: float) -> float:
 
 
 def sampled(fields: DerivedFields) -> tuple[Array, Array]:
-    """Return the fluxes and |dev eps| at the points of the owned cells.
-
-    Fluxes are the stress in the basis of Mandel, and D where there is coupling.
-    """
+    """Return stresses in the basis of Mandel, with D if coupled, and |dev eps|, at the points."""
     body, columns = fields.body, fields.columns
     count = body.domain.mesh.topology.index_map(body.dim).size_local
     flux = np.zeros((count, len(fields.points), 9 if body.piezoelectric else 6))
@@ -379,12 +363,9 @@ def _compliance(problem: ContactProblem, cells: Indices, modulus: Array) -> Arra
 def oscillation(problem: ContactProblem, time: float) -> Array:
     """Return the square of the data oscillation of the owned cells, shape (cells,). Collective.
 
-    That of the loads that the linear functions of a mesh do not see: sum over facets of
-    h |t - t_h|^2 and over cells of h^2 |f - f_h|^2 (Verfürth, A Posteriori Error Estimation
-    Techniques for Finite Element Methods, 2013, section 1.4), with t and f of the weak form, and
-    t_h and f_h of the mean loads at the nodes. Over a modulus it is an energy. The constants are
-    those of Poincaré's inequality, h/pi; of several loads on a part the squares are added. Charges
-    do not count.
+    Sums over facets of h |t - t_h|^2 and over cells of h^2 |f - f_h|^2 (Verfürth, A Posteriori
+    Error Estimation Techniques for Finite Element Methods, 2013, section 1.4), t_h and f_h being
+    the mean loads at the nodes, without charges; h/pi is the constant of Poincaré's inequality.
     """
     domain = problem.domain
     mesh, d = domain.mesh, domain.dim
@@ -439,8 +420,8 @@ def nodal_means(
 ) -> tuple[Array, NDArray[np.integer]]:
     """Return means around vertices, (n, components), and places of corners, (cells, corners).
 
-    Of some owned cells, values at their corners, (cells, corners, components), or constant there,
-    (cells, components), across no part inside of the body that is `apart`. Collective.
+    Values are those at corners, (cells, corners, components), or constant in cells, (cells,
+    components); across parts that are `apart` there are no means. Collective.
     """
     corners = shape_of(domain.mesh).corners
     dofmap, index_map = _compat.geometry_dofmap(domain.mesh), domain.mesh.geometry.index_map()
@@ -534,11 +515,8 @@ def intervals(rows: Sequence[Mapping[str, float]]) -> Intervals | None:
     The grid convergence index (Roache, J. Fluids Eng. 116, 1994) with |Q - Q_h| <= C e, e being the
     estimated error in the energy norm: C is the larger |Q_j - Q_k|/(e_j - e_k) of the last two
     refinements. Where C grows it goes on to grow, and the changes to come are a geometric series.
-    Most quantities converge faster, and lie well inside. Residuals of the solutions are added. One
-    whose changes are of both signs has not begun to converge, and has none.
-
-    The rows are those of ``adapt.csv``, the finest mesh last, all edges being cut alike: where some
-    cells are refined, most of the error of a quantity may be elsewhere.
+    Residuals are added. One whose changes are of both signs has not begun to converge. Rows are
+    those of ``adapt.csv``, of uniform refinement.
     """
     if len(rows) < 3 or not rows[-3]["error"] > rows[-2]["error"] > rows[-1]["error"]:
         return None

@@ -54,11 +54,7 @@ def nodal_function(
     shape: tuple[int, ...],
     family: str = "Lagrange",
 ) -> fem.Function:
-    """Return a function with a value of some shape on the nodes of a Lagrange space.
-
-    The values are those at the local nodes of `source`, shape (nodes, components). Of the family
-    "DG" it has them for each cell by itself.
-    """
+    """Return a function by its values at the local nodes of a space, shape (nodes, components)."""
     mesh, degree = source.mesh, source.ufl_element().embedded_superdegree
     function = fem.Function(fem.functionspace(mesh, (family, degree, shape)), name=name)
     # Two spaces of one mesh need not number their nodes alike.
@@ -168,11 +164,10 @@ def _usual_points(body: BodyEquilibrium) -> Array:
 
 
 class DerivedFields:
-    """Fields derived from the unknowns of a body at a state. The methods are collective.
+    """Fields derived from the unknowns of a body at a state, then its internal variables.
 
-    The points are those of `_usual_points`, or others, at which `chunks` alone has a meaning.
-    `shapes` has the shape of each value by name, for instance (3, 3) of the stress, whose third
-    axis is that of theta in a body of revolution; then the internal variables of the materials.
+    By name their shapes, (3, 3) of the stress, whose third axis is that of theta in a body of
+    revolution. Points are `_usual_points`, or others, for `chunks` alone. Methods are collective.
     """
 
     def __init__(
@@ -311,10 +306,9 @@ class DerivedFields:
         return 1 + int(self.body.comm.allreduce(int(self.groups.max(initial=0)), op=MPI.MAX))
 
     def means(self) -> Array:
-        """Return the cells' values around nodes, averaged by volume in each group. Collective.
+        """Return means by volume in each group, (groups, local nodes, components), NaN for none.
 
-        Shape (groups, local nodes, components), NaN at nodes of no cell of a group. Principal
-        stresses are those of the averaged stress.
+        Principal stresses are those of the averaged stress.
         """
         space, volume, groups = self.body.space, volumes(self.body.domain), self.groups
         index_map, links = space.dofmap.index_map, space.dofmap.list
@@ -338,11 +332,7 @@ class DerivedFields:
         return means
 
     def nodes(self) -> dict[str, fem.Function]:
-        """Return the fields at the nodes: the cells' values, averaged by volume. Collective.
-
-        In a mesh of several regions averages stay within each: the functions are discontinuous
-        between them, of the same degree.
-        """
+        """Return the fields at the nodes: means by volume, of several regions within each."""
         means, space, groups = self.means(), self.body.space, self.groups
         if self.group_count == 1:
             return {
@@ -397,12 +387,9 @@ def deformation(body: BodyEquilibrium, state: LinearisationPoint) -> Deformation
 
 
 def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
-    """Return the largest share of a body that has unloaded from the plastic range in a step.
-
-    Hencky's law is nonlinear elasticity: it unloads along its loading path, as no metal does. Where
-    |dev eps| decreases in the plastic range, its results are no longer those of plasticity. The
-    states are those at the ends of all steps. Collective.
-    """
+    """Return the largest share of a body in which |dev eps| decreases in the plastic range."""
+    # From one of the states, the ends of all steps, to the next. Hencky's law unloads along its
+    # loading path, as no metal does.
     body = problem.body
     laws = [hencky_of(material.law) for material in body.description.materials]
     if not states or all(law is None or is_linear(law) for law in laws):

@@ -51,10 +51,7 @@ class Differentiable(Functional, Protocol):
     """A functional that knows its derivatives, which the adjoint asks for."""
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
-        """Return the derivatives by unknowns, and by the forces at the nodes. Collective.
-
-        Unknowns are the owned ones with the global ones behind; the forces have the shape (n, d).
-        """
+        """Return derivatives by the owned and global unknowns, and by forces (n, d). Collective."""
 
 
 #: Functionals by the names of their columns.
@@ -65,19 +62,12 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Integral:
-    """The integral of a UFL density over the body, or over a part of its boundary.
+    """The integral of a UFL density over the body, or over a part of its boundary."""
 
-    Attributes
-    ----------
-    density
-        Of displacement and potential (None without one), for instance ``lambda u, phi: u[1]``;
-        products and derivatives of them too, ``ufl.div(u)``. It does not know jumps at bolts.
-    on
-        The part; None for the body. Of bodies of revolution the full turn.
-    """
-
+    #: Of displacement and potential (None without one), for instance ``lambda u, phi: u[1]``;
+    #: products and derivatives of them too, ``ufl.div(u)``. It does not know jumps at bolts.
     density: Callable[[Expr, Expr | None], Expr]
-    on: str | None = None
+    on: str | None = None  #: the part; None for the body. Of bodies of revolution the full turn
 
     def _form(self, problem: ContactProblem, at: fem.Function) -> ufl.Form:
         domain = problem.domain
@@ -106,6 +96,11 @@ def _of_contact(problem: ContactProblem, number: int | None) -> NDArray[np.bool_
     return problem.entry_numbers == number
 
 
+def _share(problem: ContactProblem, axis: int) -> float:
+    """Return the share of a force in the resultant: 0 across an axis of revolution, else 1."""
+    return float(problem.domain.resultant(np.eye(problem.dim)[axis])[axis])
+
+
 @dataclass(frozen=True)
 class ContactForce:
     """A component of the force of the body on the foundations, as ``contact_force_x``."""
@@ -118,17 +113,12 @@ class ContactForce:
         nodes = problem.nodes
         stress = problem.interface.traction(problem.nodal(state), state.forces)
         own = _of_contact(problem, self.contact)
-        return self._share(problem) * nodes.sum(np.where(own, stress[:, self.axis], 0.0))
-
-    def _share(self, problem: ContactProblem) -> float:
-        """Return the share of the resultant: 0 across an axis of revolution, else 1."""
-        unit = np.eye(problem.dim)[self.axis]
-        return float(problem.domain.resultant(unit)[self.axis])
+        return _share(problem, self.axis) * nodes.sum(np.where(own, stress[:, self.axis], 0.0))
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
         nodes = problem.nodes
-        share = np.where(_of_contact(problem, self.contact), self._share(problem), 0.0)
+        share = np.where(_of_contact(problem, self.contact), _share(problem, self.axis), 0.0)
         by_force = np.zeros_like(nodes.normal)
         by_force[:, self.axis] = share * nodes.weight
         layer = problem.interface.foundation.layer_gradient(problem.nodal(state))
@@ -152,10 +142,7 @@ class Largest(ABC):
         return float(problem.comm.allreduce(own, op=MPI.MAX))
 
     def located(self, problem: ContactProblem, state: State) -> Functional:
-        """Return the value at the node that has the largest here, whatever others have. Collective.
-
-        Where two nodes have the largest, a difference of the maximum would be that of the other.
-        """
+        """Return the value at the node that has the largest here, whatever others have."""
         at = _largest(problem, self.values(problem, state))
 
         def value(problem: ContactProblem, state: State) -> float:
@@ -438,8 +425,7 @@ def _on_support(problem: ContactProblem, part: str, axis: int) -> Array:
     """Return the weights of a support's reaction. Collective."""
     nodes, held = holding(problem, electric=False)[part]
     weights = _no_weights(problem)
-    turn = float(problem.domain.resultant(np.eye(problem.dim)[axis])[axis])
-    problem.body.nodal(weights)[nodes, : problem.dim] = turn * held[:, axis]
+    problem.body.nodal(weights)[nodes, : problem.dim] = _share(problem, axis) * held[:, axis]
     return weights
 
 

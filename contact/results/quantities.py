@@ -235,10 +235,7 @@ def values_of(file: str, given: Any, only: str = "") -> dict[str, Any]:
 
 
 def named_functionals(problem: ContactProblem) -> dict[str, Functional]:
-    """Return the quantities of a problem as functions of a state, by their columns. Collective.
-
-    All of these have derivatives, at least by the tangent; see `Quantity`.
-    """
+    """Return the quantities of a problem as functions of a state, by their columns. Collective."""
     found: dict[str, Functional] = {}
     for quantity in QUANTITIES:
         if quantity.functional is not None:

@@ -29,52 +29,29 @@ STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
 
 
 def is_of(column: str, key: str) -> bool:
-    """Tell whether a column of a table is that of a key: itself, or an entry of it.
-
-    ``reactions`` has ``reactions.left_x``, as have ``reactions.left`` and the column's own name.
-    """
-    return (
-        re.fullmatch(rf"{re.escape(key)}(\..*)?(_({'|'.join(AXES + ENDS)}))?", column) is not None
-    )
+    """Whether a column is that of a key or of an entry: ``reactions`` has ``reactions.left_x``."""
+    return bool(re.fullmatch(rf"{re.escape(key)}(\..*)?(_({'|'.join(AXES + ENDS)}))?", column))
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A key of ``summary.json``, a column of a table or a field.
+    """A key of ``summary.json``, a column of a table or a field."""
 
-    Attributes
-    ----------
-    name
-        PART, KEY and AXIS in it stand for names of the case, and x, y, z.
-    text
-        The description, with the sign; `unit` is "length", "stress", ..., empty for none.
-    value
-        A function of the subject of a file, called on all ranks: `Solution`, in ``history.csv`` a
-        `Record`, in ``contact.csv`` and ``contact.vtu`` `ContactResult`, in ``fields.vtu`` and on
-        master sides a mapping, of each contact `ContactShare`. By default the functional, or the
-        attribute or entry of the quantity's name. A mapping has several columns, a vector one per
-        component; None is for a quantity that a problem does not have, which has no key then.
-    files
-        Where it stands; the first has the description.
-    component
-        Of a list of fixed length, or of those in a table: name of the column of an entry.
-    entries
-        Names of the entries.
-    functional
-        The number as a function of problem and state, as which it has derivatives too.
-    functionals
-        Of a problem, those of the quantity's columns, by their names; of each contact also of its
-        number.
-    """
-
-    name: str
-    unit: str
-    text: str
+    name: str  #: PART, KEY and AXIS in it stand for names of the case, and x, y, z
+    unit: str  #: "length", "stress", ..., empty for none
+    text: str  #: the description, with the sign
+    #: A function of the subject of a file, called on all ranks: `Solution`, in ``history.csv`` a
+    #: `Record`, in ``contact.csv`` and ``contact.vtu`` `ContactResult`, in ``fields.vtu`` and on
+    #: master sides a mapping, of each contact `ContactShare`. By default the functional, or the
+    #: attribute or entry of the quantity's name. A mapping has several columns, a vector one per
+    #: component; None is for a quantity that a problem does not have, which has no key then.
     value: Callable[[Any], Any] | None = None
-    files: tuple[str, ...] = (SUMMARY,)
-    component: str = ""
-    entries: tuple[str, ...] = AXES
+    files: tuple[str, ...] = (SUMMARY,)  #: where it stands; the first has the description
+    component: str = ""  #: name of the column of an entry, of a vector
+    entries: tuple[str, ...] = AXES  #: their names
+    #: The number as a function of problem and state, as which it has derivatives too.
     functional: Functional | None = None
+    #: Of a problem those of its columns, by their names; of each contact also of its number.
     functionals: Callable[..., Mapping[str, Functional]] | None = None
 
     def of(self, given: Any) -> Any:

@@ -89,10 +89,7 @@ def announce(solution: Solution) -> None:
 
 
 def evaluate_extremes(solution: Solution, whole: bool = True) -> list[float]:
-    """Give a solution its extremes of stress and strain, and return |dev eps| by material.
-
-    `whole`: it is given deformation and error estimate too. Collective.
-    """
+    """Give a solution its extremes, if `whole` its error too; return |dev eps| by material."""
     body = solution.problem.body
     fields = DerivedFields(body, solution.state)
     extremes = fields.extremes()
@@ -181,13 +178,11 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
 
 
 def small_strain(solution: Solution) -> Iterator[Remark]:
-    """Warn of strains or rotations that are not small.
-
-    To turn by an angle a makes the determinant 1 + a^2, and strains at most 1 + sqrt(3) |eps|.
-    """
+    """Warn of strains or rotations that are not small."""
     made = solution.deformation
     if made is None:
         return
+    # To turn by an angle a makes the determinant 1 + a^2, and strains at most 1 + sqrt(3) |eps|.
     turned = made.largest_volume - 1 - np.sqrt(3) * made.largest_strain
     if max(made.largest_strain, turned) > SMALL:
         yield (
@@ -198,10 +193,7 @@ def small_strain(solution: Solution) -> Iterator[Remark]:
 
 
 def untouched(solution: Solution) -> Iterator[Remark]:
-    """Warn of a static problem in which no node is in contact; a load step may end like that.
-
-    A shape with a tip may also reach into the body between the nodes.
-    """
+    """Warn of a static problem in which no node is in contact; a load step may end like that."""
     problem = solution.problem
     closed = problem.comm.allreduce(bool(np.any(solution.status != "open")), op=MPI.LOR)
     met = closed or any(record.row["contact_nodes"] > 0 for record in solution.steps)
@@ -214,12 +206,7 @@ def untouched(solution: Solution) -> Iterator[Remark]:
 
 
 def rounding(solution: Solution) -> Iterator[Remark]:
-    """Warn of forces that are small beside those in the bodies, and hardly known. Collective.
-
-    Long bodies, or stretched ones, bear forces of many times the loads or the contact forces, and
-    residuals are relative to all of them. Where supports move the body, their reactions are among
-    its loads.
-    """
+    """Warn of forces that are small beside those in the bodies, and hardly known. Collective."""
     problem, state, outcome = solution.problem, solution.state, solution.outcome
     body, asked, larger = problem.body, outcome.allowed.equilibrium, "far larger forces act"
     if solution.rounding > asked:
@@ -250,10 +237,8 @@ def rounding(solution: Solution) -> Iterator[Remark]:
 def limit_load(solution: Solution) -> Iterator[Remark]:
     """Tell that a body without hardening has a limit load, where a method fails."""
     laws = [base_of(material.law) for material in solution.problem.description.materials]
-    perfect = any(
-        isinstance(law, J2) and not law.kinematic and law.strength(np.ones(1)) == law.yield_stress
-        for law in laws
-    )
+    flows = [law for law in laws if isinstance(law, J2) and not law.kinematic]
+    perfect = any(law.strength(np.ones(1)) == law.yield_stress for law in flows)
     if perfect and not solution.converged:
         yield (
             'a material with law = "j2" has no hardening, and the loads may be more than the limit '
@@ -264,20 +249,15 @@ def limit_load(solution: Solution) -> Iterator[Remark]:
 def several_solutions(solution: Solution) -> Iterator[Remark]:
     """Warn where several solutions may exist. Collective."""
     reasons = falling_friction, strong_friction, falling_layer
+    words = f"several solutions may exist, and this is one reached from {solution.start}"
     for reason in chain.from_iterable(find(solution) for find in reasons):
-        yield (
-            f"several solutions may exist, and this is one reached from {solution.start}: {reason}"
-        )
+        yield f"{words}: {reason}"
 
 
 def falling_friction(solution: Solution) -> Iterator[str]:
-    """Find an L_mu above the bound that a sliding block gives.
-
-    A block of height H under the pressure p slides by s where G (U - s)/H = mu(s) p; the
-    left-hand side falls faster than the right for all s if L_mu < G/(p H), and only then is s
-    unique for every U. A pressure that is uneven is larger where most of it acts: there it counts
-    with its own weight, and half of G.
-    """
+    """Find an L_mu above the bound of a sliding block."""
+    # Of height H and under the pressure p it slides by s, G (U - s)/H = mu(s) p, which is unique
+    # for every U if L_mu < G/(p H). An uneven pressure counts by its own weight, and half of G.
     problem, law = solution.problem, solution.problem.interface.friction.law
     if law is None:
         return
@@ -325,23 +305,23 @@ def falling_layer(solution: Solution) -> Iterator[str]:
         yield "p_nu falls with the penetration of the layer"
 
 
-def locks(solution: Solution) -> bool:
-    """Whether elements of degree 1 may be much too stiff, for volumes hardly change."""
+def locks(solution: Solution) -> str | None:
+    """Return the remedy of elements that may be much too stiff, for volumes hardly change."""
     error, body = solution.error, solution.problem.body
-    if error is None or error.stiffness_ratio is None:
-        return False
-    remedy = unlocked(body.element, body.degree, shape_of(body.domain.mesh))
-    return remedy is not None and error.stiffness_ratio >= LOCKED and error.relative > EXACT
+    stiff = error is not None and (error.stiffness_ratio or 0.0) >= LOCKED
+    if error is None or not stiff or error.relative <= EXACT:
+        return None
+    return unlocked(body.element, body.degree, shape_of(body.domain.mesh))
 
 
 def locking(solution: Solution) -> Iterator[Remark]:
     """Warn of volumetric locking, or that of stiff fibres."""
-    error, body = solution.error, solution.problem.body
-    if error is not None and locks(solution):
+    error, remedy = solution.error, locks(solution)
+    if error is not None and remedy is not None:
         yield (
             f"the mesh may lock, displacements may be too small, and the estimated error a lower "
             f"bound: the ratio of bulk and shear modulus is {error.stiffness_ratio:.3g} where the "
-            f"energy is; {unlocked(body.element, body.degree, shape_of(body.domain.mesh))}"
+            f"energy is; {remedy}"
         )
 
 
@@ -463,10 +443,7 @@ def _beside(problem: ContactProblem, parts: list[str]) -> tuple[Array, NDArray[n
 
 
 def beyond_heights(problem: ContactProblem, touched: NDArray[np.bool_]) -> Iterator[Remark]:
-    """Warn of contact beyond the last place of measured heights; of the touched nodes. Collective.
-
-    `touched`: which nodes are in contact, shape (n,); before a solve all may be.
-    """
+    """Warn of nodes in contact, touched (n,), beyond the last of measured heights. Collective."""
     begin = 0
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
         nodes, shape = geometry.nodes, contact.foundation

@@ -33,19 +33,10 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class Resultant:
-    """The sum of forces at nodes.
+    """The sum of forces at nodes, in the reference configuration; of revolution of a full turn."""
 
-    Attributes
-    ----------
-    force
-        Shape (d,); of a body of revolution that of the full turn, along the axis.
-    moment
-        About the origin of coordinates, of points in the reference configuration: shape (1,) in
-        2-D, about z, and (3,) in 3-D. Over the full turn moments cancel.
-    """
-
-    force: Array
-    moment: Array
+    force: Array  #: shape (d,)
+    moment: Array  #: about the origin, shape (1,) in 2-D, about z, and (3,) in 3-D
 
 
 def resultant(problem: ContactProblem, points: Array, forces: Array) -> Resultant:
@@ -69,11 +60,7 @@ def contact_resultant(problem: ContactProblem, state: State) -> Resultant:
 
 
 def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
-    """Return the forces of the supports on the body, part by part. Collective.
-
-    They balance with loads and contact. A component of a node on two parts counts for the one that
-    stands first.
-    """
+    """Return the forces of the supports on the body, part by part. Collective."""
     d, body = problem.dim, problem.body
     residual = body.nodal(residual_forces(problem, state))[:, :d]
     points = body.space.tabulate_dof_coordinates()[:, :d]
@@ -92,10 +79,10 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
 
 
 def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[np.int32], Array]]:
-    """Return where residuals are reactions of supports, or charges of electrodes. Collective.
+    """Return the nodes of supports, or electrodes, and matrices from residuals to reactions there.
 
-    Part -> its nodes, and the matrices from residuals there to its forces, shape (n, d, d), or
-    charges, (n, 1, 1). A roller bears forces along its normal alone.
+    By part; (n, d, d), or (n, 1, 1). A component of a node on two parts counts for the first of
+    them, and a roller bears forces along its normal alone. Collective.
     """
     d, body = problem.dim, problem.body
     found: dict[str, tuple[NDArray[np.int32], Array]] = {}
@@ -140,11 +127,7 @@ class DrivenPart:
 
     @staticmethod
     def of(problem: ContactProblem) -> DrivenPart | None:
-        """Return the driven part of a problem; None without any. Collective.
-
-        It is the first one whose displacement is prescribed as a function of time, or the first
-        one with a load.
-        """
+        """Return the first part that moves in time, or has a load; None without any. Collective."""
         on = _driven(problem.description)
         if on is None:
             return None
@@ -265,11 +248,7 @@ def mean_potential(problem: ContactProblem, state: State, part: str) -> float:
 
 
 def sensor(problem: ContactProblem, state: State, electrode: str) -> Reading:
-    """Return the reading of an electrode: its charge where its potential is held. Collective.
-
-    A short-circuited electrode (prescribed potential) is read by its charge, one that is left
-    open by its mean potential; it is then no conductor, but a strip of the free surface.
-    """
+    """Return charge and mean potential of an electrode, or of a strip of surface. Collective."""
     charges = charge_balance(problem, state).electrodes
     return Reading(charges.get(electrode), mean_potential(problem, state, electrode))
 
@@ -288,14 +267,10 @@ Movements = dict[str, dict[str, Any]]
 
 
 def movements(problem: ContactProblem, state: State) -> Movements:
-    """Return the motions of rigid bodies, and the potentials of electrodes. Collective.
+    """Return the entries `rigid`, `rigid_parts`, `electrodes` and `bolts` of the summary.
 
-    ``rigid`` is the foundation that moves, its `displacement`, `rotation` (degrees), `force` and
-    `moment`; of several it has one entry each, by part. ``rigid_parts`` are the parts that move as
-    rigid bodies, ``electrodes`` those of unknown `potential`, with their `charge`, ``bolts`` cuts,
-    with `shortening` and section `force`, tension positive; a key is absent where there are none.
-    Vectors are lists; rotations and moments are numbers in the plane. Forces, moments and charges
-    act from outside: those given, or the reactions of components that are given.
+    Forces, moments and charges act from outside: those given, or the reactions of components that
+    are given. Collective.
     """
     foundations, parts, electrodes, bolts = (dict[str, Any]() for _ in range(4))
     body = problem.body
@@ -344,11 +319,7 @@ NAMES = {
 
 
 def rigid_columns(moving: Movements, *keys: str) -> dict[str, float]:
-    """Return the columns of some keys of rigid bodies, from their `movements`.
-
-    Of several foundations the names have that of the part behind them, and so have those of rigid
-    parts, but where there is one and no foundation moves.
-    """
+    """Return the columns of some keys of rigid bodies, from their `movements`."""
     rigid, parts = moving.get("rigid", {}), moving.get("rigid_parts", {})
     foundations = {"": rigid} if isinstance(rigid.get("displacement"), list) else rigid
     bodies, found = [*foundations.values(), *parts.values()], dict[str, float]()
@@ -366,13 +337,11 @@ def part_columns(moving: Movements, kind: str, prefix: str, *keys: str) -> dict[
 
 
 def name_ends(foundations: Sequence[str], parts: Sequence[str]) -> list[str]:
-    """Return the ends of the columns of moving foundations and of rigid parts."""
-    several = [f"_{part}" for part in foundations]
-    alone = not foundations and len(parts) == 1
-    return [
-        *(several if len(foundations) > 1 else [""] * len(foundations)),
-        *([""] if alone else [f"_{part}" for part in parts]),
-    ]
+    """Return the ends of columns: the part of one of several foundations, and of rigid parts."""
+    names = [f"_{part}" for part in (*foundations, *parts)]
+    if len(foundations) == 1 or len(names) == 1:
+        names[0] = ""
+    return names
 
 
 def columns_of(name: str, size: int, end: str) -> list[str]:

@@ -57,22 +57,12 @@ class Note(str):
 
 @dataclass(frozen=True, repr=False)
 class StepRecord:
-    """The end of a step of an evolution, and its row in the table of steps.
-
-    Attributes
-    ----------
-    row
-        The columns of ``steps.csv``.
-    enthalpy
-        Where the energy balance of the next step begins, see `problem.residuals.Balance`.
-    rounding
-        Largest `equilibrium_rounding` of a step so far, see `problem.residuals.Residuals`.
-    """
+    """The end of a step of an evolution, and its row in the table of steps."""
 
     state: State
-    row: Mapping[str, float]
-    enthalpy: float
-    rounding: float = 0.0
+    row: Mapping[str, float]  #: the columns of ``steps.csv``
+    enthalpy: float  #: where the energy balance of the next step begins, see `Balance`
+    rounding: float = 0.0  #: largest `equilibrium_rounding` of a step so far
 
     def __repr__(self) -> str:
         """Return the main columns; `row` has all."""

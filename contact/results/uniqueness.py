@@ -47,16 +47,12 @@ def uniqueness(
 ) -> tuple[float, bool]:
     """Return the least multiple of the present mu at which the linearised problem is singular.
 
-    Beside it, whether a state without contact forces is in equilibrium too: friction alone keeps
-    the bodies in contact. Below 1 the friction that is there is enough for several solutions. The
-    touching nodes slide in the directions of their friction stresses, or all in one direction, or
-    in the opposite ones, in 3-D the principal ones of their stiffness and of the pressures that
-    slips change; of a body that touches nothing those that touch in the reference configuration.
-    The factor belongs to these slips: by others the Jacobian may be singular at less.
-    Infinity without such a factor, and where nothing is known: with a layer, a
-    potential, or a smoothed pressure, and of slips against which the bodies do not deform. NaN with
-    more than `MOST` contact nodes, where it is not looked for. A method may have the condensed body
-    already. Collective.
+    Beside it, whether a state without contact forces is in equilibrium too. Below 1 the friction
+    that is there is enough for several solutions. The touching nodes, or those that touch in the
+    reference configuration, slide in the directions of their friction stresses, or all in one
+    direction (`_uniform`); by other slips the Jacobian may be singular at less. Infinity without
+    such a factor, and with a layer, a potential, or a smoothed pressure; NaN with more than `MOST`
+    contact nodes. Collective.
     """
     interface = problem.interface
     nodes, friction = interface.nodes, interface.friction
