@@ -109,7 +109,7 @@ class Contents:
     points: Any  #: coordinates of the nodes, shape (n, 3)
     #: Name of a shape, as meshio or basix has it, and elements by their nodes: corners in VTK's
     #: order, those between them in the order of the program.
-    blocks: Sequence[tuple[str, Ints]]
+    blocks: list[tuple[str, Ints]]
     #: Name -> number of a block -> its elements in the group.
     groups: dict[str, dict[int, Ints]] = field(default_factory=dict)
     nodes: dict[str, Ints] = field(default_factory=dict)  #: name -> nodes of a set
@@ -137,6 +137,13 @@ class Contents:
             self.nodes[name] = np.union1d(self.nodes.get(name, members), members)
 
 
+def in_space(points: Array) -> Array:
+    """Return points, (n, 1 to 3), with three coordinates."""
+    found = np.zeros((len(points), 3))
+    found[:, : np.shape(points)[1]] = points
+    return found
+
+
 def decoded(given: bytes) -> str:
     """Return a text of a file, in UTF-8 or else Latin-1."""
     try:
@@ -161,15 +168,12 @@ def _by_number(key: str, arrays: Sequence[Array]) -> Iterator[tuple[str, int, In
 
 
 def with_one_shape(contents: Contents) -> Contents:
-    """Return contents with cells of one of `SHAPES`: others, or several, are cut into simplices.
-
-    Unknown cells, and those of higher order, are left for `check` to refuse.
-    """
+    """Return contents with cells of one of `SHAPES`: others, or several, are cut into simplices."""
     kinds = contents.kinds
     dim = max((kind.dim for kind in kinds), default=0)
     cells = list(dict.fromkeys(kind for kind in kinds if kind.dim == dim))
     if dim < 2 or not all(kind.known for kind in cells):
-        return contents
+        return contents  # which `check` refuses
     alone = len(cells) == 1 and Shape(cells[0].name) in SHAPES
     if alone and all(
         uncollapsed(rows[:, : kind.corners]).all()
@@ -185,7 +189,7 @@ def with_one_shape(contents: Contents) -> Contents:
 
 def _cut(contents: Contents, kinds: Sequence[Kind], dim: int, note: str) -> Contents:
     """Return the contents of a file with its cells and their facets cut into simplices."""
-    blocks: list[tuple[str, Ints]] = list(contents.blocks)
+    blocks = [*contents.blocks]
     groups: dict[str, dict[int, Ints]] = {name: {} for name in contents.groups}
     for b, (kind, (_, nodes)) in enumerate(zip(kinds, contents.blocks, strict=True)):
         count = np.ones(len(nodes), dtype=np.int64)
@@ -216,10 +220,9 @@ def _cut(contents: Contents, kinds: Sequence[Kind], dim: int, note: str) -> Cont
 def in_dolfinx_order(shape: Shape, points: Array, rows: Ints) -> Ints:
     """Return cells with their nodes in the order of dolfinx, as far as serendipity cells have them.
 
-    Programs number the nodes between corners differently: of hexahedra Exodus has the vertical
-    edges before the upper ones, Abaqus the middle before the faces, MED the lower face first. The
-    order of a file is the one with the least distance of all nodes from the middles of straight
-    edges, and then from the interpolated nodes in faces and cells: an assignment problem.
+    Programs number the nodes between corners differently. The order of a file is the one with the
+    least distance of all nodes from the middles of straight edges, and then from the interpolated
+    nodes in faces and cells: an assignment problem.
     """
     count = rows.shape[1]
     second = count > shape.corners
@@ -300,15 +303,14 @@ SERENDIPITY = (
 def check(contents: Contents) -> Cells:
     """Check a mesh, and return it in the form in which it is distributed.
 
-    Groups may overlap. A group of facets that are not all on the boundary of the body can be fixed,
-    or an electrode, but nothing else; one without a cell is left out.
-
     Refuses cells other than triangles or quadrilaterals in a plane z = const, or solids, of order 1
     or 2; flat, folded and overlapping cells; and meshes of which no part is left.
     """
     given, empty = contents.kinds, _empty_groups(contents)
     dim = max((kind.dim for kind in given), default=0)
-    _check_numbers(contents)
+    for _, nodes in contents.blocks:
+        if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(contents.points):
+            raise InputError("it has elements whose nodes it does not have", "mesh-file")
     contents = with_one_shape(contents)
     shape = _check_kinds([kind for kind in contents.kinds if kind.dim == dim], dim)
     points = np.asarray(contents.points, dtype=float)
@@ -359,13 +361,6 @@ def _empty_groups(contents: Contents) -> dict[str, str]:
     return {
         name: f"the physical group {name!r} has no elements" for name in empty if name not in others
     }
-
-
-def _check_numbers(contents: Contents) -> None:
-    """Refuse elements whose nodes are not among the points."""
-    for _, nodes in contents.blocks:
-        if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(contents.points):
-            raise InputError("it has elements whose nodes it does not have", "mesh-file")
 
 
 def _all_cells(contents: Contents, points: Array, shape: Shape) -> Ints:

@@ -29,7 +29,7 @@ import numpy as np
 
 from contact.errors import InputError
 from contact.mesh.cells import FACES, joined_facets
-from contact.mesh.contents import Contents, Ints, Kind, decoded
+from contact.mesh.contents import Contents, Ints, Kind, decoded, in_space
 
 
 @contextmanager
@@ -61,12 +61,9 @@ def session() -> Iterator[Any]:
 
 
 def read_msh(file: Path) -> Contents:
-    """Read a .msh file; execute nothing in it or beside it.
-
-    Gmsh executes files of another beginning as scripts, unpacks those of some endings by other
-    programs, and reads options from a file beside: the file is checked, and read by another name.
-    Refuses a file that begins otherwise, is cut off, or is refused by Gmsh.
-    """
+    """Read a .msh file; execute nothing in it or beside it."""
+    # Gmsh executes files of another beginning as scripts, unpacks those of some endings by other
+    # programs, and reads options from a file beside: it reads a checked file by another name.
     with file.open("rb") as stream:
         start = re.match(rb"\$MeshFormat[ \t]*\r?\n\s*([24])[. \t]", stream.read(100))
         stream.seek(max(0, file.stat().st_size - 100))
@@ -90,10 +87,7 @@ def read_msh(file: Path) -> Contents:
 
 
 def model_contents(model: Any, entities_are_groups: bool = False) -> Contents:
-    """Return nodes, elements and groups, physical ones or entities, of ``gmsh.model``.
-
-    A group without a name goes by its number.
-    """
+    """Return nodes, elements and groups, physical ones or entities, of ``gmsh.model``."""
     tags, points, _ = model.mesh.getNodes()
     order = np.argsort(tags)
     tags = tags[order].astype(np.int64)
@@ -139,29 +133,22 @@ def read_med(file: Path) -> Contents:
         if len(steps) != 1:
             raise ValueError(f"a mesh at {len(steps)} times; accepted: one")
         families = data.get(f"FAS/{meshes[0]}", whole.get("FAS", {}))
-        return _med_contents(steps[0], int(whole.attrs["ESP"]), families)
-
-
-def _med_contents(mesh: Any, dim: int, families: Any) -> Contents:
-    """Return the contents of a mesh at a time."""
-    coordinates = np.asarray(mesh["NOE/COO"][()], dtype=float).reshape(dim, -1).T
-    points = np.zeros((len(coordinates), 3))
-    points[:, :dim] = coordinates
-    blocks: list[tuple[str, Ints]] = []
-    made = Contents(points, blocks)
-    named = _med_names(families.get("ELEME", {}))
-    for kind, given in mesh["MAI"].items():
-        if kind == "PO1":
-            continue
-        stem = kind.rstrip("0123456789")
-        if stem not in MED_KINDS:
-            raise ValueError(f"elements {kind} that are not known")
-        name, count = "pyramid" if kind == "P13" else MED_KINDS[stem], int(kind[len(stem) :])
-        rows = np.asarray(given["NOD"][()], dtype=np.int64).reshape(count, -1).T - 1
-        for group, members in _med_groups(given, named).items():
-            made.groups.setdefault(group, {})[len(blocks)] = members
-        blocks.append((name, rows))
-    made.nodes |= _med_groups(mesh["NOE"], _med_names(families.get("NOEUD", {})))
+        mesh, dim = steps[0], int(whole.attrs["ESP"])
+        coordinates = np.asarray(mesh["NOE/COO"][()], dtype=float).reshape(dim, -1).T
+        made = Contents(in_space(coordinates), [])
+        named = _med_names(families.get("ELEME", {}))
+        for kind, given in mesh["MAI"].items():
+            if kind == "PO1":
+                continue
+            stem = kind.rstrip("0123456789")
+            if stem not in MED_KINDS:
+                raise ValueError(f"elements {kind} that are not known")
+            name, count = "pyramid" if kind == "P13" else MED_KINDS[stem], int(kind[len(stem) :])
+            rows = np.asarray(given["NOD"][()], dtype=np.int64).reshape(count, -1).T - 1
+            for group, members in _med_groups(given, named).items():
+                made.groups.setdefault(group, {})[len(made.blocks)] = members
+            made.blocks.append((name, rows))
+        made.nodes |= _med_groups(mesh["NOE"], _med_names(families.get("NOEUD", {})))
     return made
 
 
@@ -218,64 +205,39 @@ def read_exodus(file: Path) -> Contents:
 
     with netCDF4.Dataset(str(file)) as data:
         data.set_auto_mask(False)
-        points = np.zeros((len(data.dimensions["num_nodes"]), 3))
-        if "coord" in data.variables:
-            given = np.asarray(data.variables["coord"][:], dtype=float)
-            points[:, : len(given)] = given.T
-        else:
-            for axis, name in enumerate(("coordx", "coordy", "coordz")):
-                if name in data.variables:
-                    points[:, axis] = data.variables[name][:]
-        made = Contents(points, [])
-        _add_exodus_blocks(data, made)
-        _add_exodus_sets(data, made)
+        given, axes = data.variables, ("coordx", "coordy", "coordz")
+        alone = [given[axis][:] for axis in axes if axis in given]
+        coordinates = given["coord"][:] if "coord" in given else alone
+        made = Contents(in_space(np.transpose(coordinates)), [])
+
+        def numbers(variable: str) -> Ints:
+            return np.asarray(given[variable][:], dtype=np.int64) - 1
+
+        for number, name in _exodus_names(data, "eb", "num_el_blk"):
+            if f"connect{number}" not in given:  # a block of no elements
+                made.blocks.append(("vertex", np.zeros((0, 1), dtype=np.int64)))
+                continue
+            rows, kind = numbers(f"connect{number}"), given[f"connect{number}"].elem_type
+            made.groups.setdefault(name, {})[len(made.blocks)] = np.arange(len(rows))
+            made.blocks.append((_kind(str(kind)), rows))
+        for number, name in _exodus_names(data, "ns", "num_node_sets"):
+            if f"node_ns{number}" in given:
+                chosen = numbers(f"node_ns{number}")
+                made.nodes[name] = np.union1d(made.nodes.get(name, chosen), chosen)
+        for number, name in _exodus_names(data, "ss", "num_side_sets"):
+            if f"elem_ss{number}" in given:
+                elements, sides = (numbers(f"{of}_ss{number}") for of in ("elem", "side"))
+                made.surfaces[name] = _side_facets(made, elements, sides)
     return made
 
 
-def _add_exodus_blocks(data: Any, made: Contents) -> None:
-    """Add the elements, and each block as a group."""
-    blocks: list[tuple[str, Ints]] = []
-    for number, name in enumerate(_exodus_names(data, "eb", _count(data, "num_el_blk"))):
-        if f"connect{number + 1}" not in data.variables:  # a block of no elements
-            blocks.append(("vertex", np.zeros((0, 1), dtype=np.int64)))
-            continue
-        given = data.variables[f"connect{number + 1}"]
-        rows = np.asarray(given[:], dtype=np.int64) - 1
-        blocks.append((_kind(str(given.elem_type)), rows))
-        made.groups.setdefault(name, {})[number] = np.arange(len(rows), dtype=np.int64)
-    made.blocks = blocks
-
-
-def _add_exodus_sets(data: Any, made: Contents) -> None:
-    """Add node sets and side sets."""
-    for number, name in enumerate(_exodus_names(data, "ns", _count(data, "num_node_sets")), 1):
-        if f"node_ns{number}" in data.variables:
-            chosen = np.asarray(data.variables[f"node_ns{number}"][:], dtype=np.int64) - 1
-            made.nodes[name] = np.union1d(made.nodes.get(name, chosen), chosen)
-    for number, name in enumerate(_exodus_names(data, "ss", _count(data, "num_side_sets")), 1):
-        if f"elem_ss{number}" in data.variables:
-            elements, sides = (
-                np.asarray(data.variables[f"{of}_ss{number}"][:], dtype=np.int64) - 1
-                for of in ("elem", "side")
-            )
-            made.surfaces[name] = _side_facets(made, elements, sides)
-
-
-def _count(data: Any, dimension: str) -> int:
-    """Return a dimension of the file, 0 without it."""
-    return len(data.dimensions[dimension]) if dimension in data.dimensions else 0
-
-
-def _exodus_names(data: Any, kind: str, count: int) -> list[str]:
-    """Return the names of blocks or sets; one without a name goes by its number."""
-    numbers = data.variables.get(f"{kind}_prop1")
-    names = data.variables.get(f"{kind}_names")
-    found = []
-    for k in range(count):
+def _exodus_names(data: Any, kind: str, dimension: str) -> Iterator[tuple[int, str]]:
+    """Yield the numbers, from 1, and names of blocks or sets; one without goes by its property."""
+    properties, names = (data.variables.get(f"{kind}_{of}") for of in ("prop1", "names"))
+    for k in range(len(data.dimensions[dimension]) if dimension in data.dimensions else 0):
         said = b"" if names is None else b"".join(names[k])
-        number = k + 1 if numbers is None else int(numbers[k])
-        found.append(decoded(said.split(b"\0")[0]).strip() or str(number))
-    return found
+        number = k + 1 if properties is None else int(properties[k])
+        yield k + 1, decoded(said.split(b"\0")[0]).strip() or str(number)
 
 
 def _side_facets(contents: Contents, elements: Ints, sides: Ints) -> Ints:
@@ -322,18 +284,21 @@ def read_xdmf(file: Path) -> Contents:
     places, *others = (_xdmf_array(item, root, file) for item in given)
     if any(not np.array_equal(places, other) for other in others):
         raise ValueError(f"it has several meshes; {XDMF_ACCEPTED}")
-    points, blocks = np.zeros((len(places), 3)), list[tuple[str, Ints]]()
-    points[:, : places.shape[1]] = places
-    made = Contents(points, blocks)
+    made = Contents(in_space(places), [])
     for grid in grids:
-        own, first = _xdmf_blocks(grid, root, file), len(blocks)
+        own, first = _xdmf_blocks(grid, root, file), len(made.blocks)
         ends = np.cumsum([len(rows) for _, rows in own])
-        for name, on, values in _xdmf_attributes(grid, root, file):
-            if on == "Node" and len(values) == len(points):
-                made.add_nodes(name, values)
+        for attribute in grid.iter("Attribute"):
+            item = attribute.find("DataItem")
+            values = None if item is None else _xdmf_array(item, root, file)
+            if values is None or values.size != len(values):  # no scalars
+                continue
+            name, on = attribute.get("Name", ""), attribute.get("Center", "Node")
+            if on == "Node" and len(values) == len(made.points):
+                made.add_nodes(name, values.reshape(-1))
             elif on == "Cell" and len(values) == ends[-1]:
-                made.add_groups(name, np.split(values, ends[:-1]), first)
-        blocks += own
+                made.add_groups(name, np.split(values.reshape(-1), ends[:-1]), first)
+        made.blocks += own
     return made
 
 
@@ -345,19 +310,6 @@ def array_files(file: Path) -> list[Path]:
         names = [t.rpartition(":")[0] if f == "HDF" else t for f, t in texts if f in FILES]
         return [file.parent / name for name in dict.fromkeys(names)]
     return []
-
-
-def _xdmf_attributes(grid: Element, root: Element, file: Path) -> list[tuple[str, str, Any]]:
-    """Return the scalar arrays of a grid: name, "Node" or "Cell", values."""
-    found = []
-    for given in grid.iter("Attribute"):
-        item = given.find("DataItem")
-        if item is not None:
-            values = _xdmf_array(item, root, file)
-            if values.size == len(values):
-                on = given.get("Center", "Node")
-                found.append((given.get("Name", ""), on, values.reshape(-1)))
-    return found
 
 
 def _xdmf_blocks(grid: Element, root: Element, file: Path) -> list[tuple[str, Ints]]:

@@ -23,18 +23,6 @@ def rotate(mesh: dmesh.Mesh, degrees: float, axis: Sequence[float] = (0.0, 1.0, 
         mesh.geometry.x[:] = mesh.geometry.x @ turn.T
 
 
-#: Sides of the generators: name -> (axis, end), end 0 at the lower coordinate.
-RECTANGLE_SIDES = {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)}
-BOX_SIDES = {
-    "left": (0, 0),
-    "right": (0, 1),
-    "front": (1, 0),
-    "back": (1, 1),
-    "bottom": (2, 0),
-    "top": (2, 1),
-}
-
-
 #: Shortest edge of a rectangle or box that dolfinx takes for one.
 SHORTEST = float(np.finfo(np.float64).eps)
 
@@ -44,8 +32,14 @@ STRETCHED = 1e6
 #: Generator -> its shapes of cells, the usual one first.
 CELLS = {"rectangle": ("triangle", "quadrilateral"), "box": ("tetrahedron", "hexahedron")}
 
-#: Generator -> its sides.
-SIDES = {"rectangle": RECTANGLE_SIDES, "box": BOX_SIDES}
+#: Generator -> its sides: name -> (axis, end), end 0 at the lower coordinate.
+SIDES = {
+    "rectangle": {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)},
+    "box": {
+        **{"left": (0, 0), "right": (0, 1), "front": (1, 0), "back": (1, 1)},
+        **{"bottom": (2, 0), "top": (2, 1)},
+    },
+}
 
 
 class GridError(InputError):

@@ -25,7 +25,7 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.mesh.abaqus import included_files, read_abaqus
-from contact.mesh.contents import Cells, Contents, Groups, check
+from contact.mesh.contents import Contents, Groups, check, in_space
 from contact.mesh.domain import Domain, with_names
 from contact.mesh.entities import Indices, combinations, exterior_facets, labels_of
 from contact.mesh.formats import (
@@ -48,9 +48,8 @@ CONVERTED = '<Information Name="contact" Value="{'
 def _by_meshio(module: str, file: Path) -> Contents:
     """Read a file by a module of meshio: cells, sets, and whole numbers of cells and nodes."""
     mesh = import_module(f"meshio.{module}").read(file)
-    points = np.zeros((len(mesh.points), 3))
-    points[:, : mesh.points.shape[1]] = mesh.points
-    made = Contents(points, [(block.type, block.data.astype(np.int64)) for block in mesh.cells])
+    blocks = [(block.type, block.data.astype(np.int64)) for block in mesh.cells]
+    made = Contents(in_space(mesh.points), blocks)
     for key, arrays in mesh.cell_data.items():
         made.add_groups(key, arrays)
     for key, values in mesh.point_data.items():
@@ -153,11 +152,7 @@ def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
 
 
 def convert(file: Path, to: Path) -> Domain:
-    """Write a mesh file (`from_file`) as XDMF of which each rank reads its share. On one rank.
-
-    Another file with the ending .h5 is written beside it, and files that are there already are
-    refused. The mesh that has been written is returned.
-    """
+    """Write a mesh file as new .xdmf and .h5 files, of which ranks read shares. On one rank."""
     domain = from_file(MPI.COMM_SELF, file)
     write(domain, to)
     return domain
@@ -265,23 +260,18 @@ def from_generator(
 
 
 def _from_rank_0(comm: MPI.Intracomm, load: Callable[[], Contents], source: str) -> Domain:
-    """Check on rank 0 the contents that ``load`` returns there, and distribute them."""
+    """Check on rank 0 the contents that ``load`` returns there, and distribute them. Collective."""
     with on_all_ranks(comm):
-        raw = _checked(load, source) if comm.rank == 0 else None
+        raw = None
+        if comm.rank == 0:
+            try:
+                raw = check(load())
+            except InputError as error:
+                raise error.within(f"{source}: ") from None
+            for note in raw.notes:
+                logger.info("%s: %s", source, note)
     names = comm.bcast(None if raw is None else raw.without_rows())
-    return _distribute(comm, names if raw is None else raw, source)
-
-
-def _checked(load: Callable[[], Contents], source: str) -> Cells:
-    """Return contents that have been checked, or name their source."""
-    try:
-        return check(load())
-    except InputError as error:
-        raise error.within(f"{source}: ") from None
-
-
-def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
-    """Distribute a checked mesh over the ranks, and name its parts and regions. Collective."""
+    raw = raw or names
     dim = raw.points.shape[1]
     order = raw.shape.degree_of(raw.regions.rows.shape[1])
     element = basix.ufl.element("Lagrange", raw.shape.name, order, shape=(dim,), dtype=np.float64)
@@ -289,13 +279,9 @@ def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
     exterior_facets(mesh)
     parts, regions = _sets(mesh, dim - 1, raw.parts), _sets(mesh, dim, raw.regions)
     inside = {name: parts.pop(name) for name in raw.inside}
-    domain = with_names(mesh, parts, regions)
-    if comm.rank == 0:
-        for note in raw.notes:
-            logger.info("%s: %s", source, note)
     unusable = {name: f"{source}: {reason}" for name, reason in raw.unusable.items()}
     more: dict[str, Any] = {"notes": raw.notes, "inside": inside, "space": raw.space}
-    return replace(domain, unusable=unusable, **more)
+    return replace(with_names(mesh, parts, regions), unusable=unusable, **more)
 
 
 def _sets(mesh: dmesh.Mesh, dim: int, groups: Groups) -> dict[str, Indices]:

@@ -171,18 +171,6 @@ def _motions(
 
 def read_step(folder: Path, number: int) -> Run:
     """Read the results at the end of a step, numbered from 1; refuse one without fields."""
-    run, frames = _frames(folder)
-    known = {frame[1] + 1: frame for frame in frames}
-    if number not in known:
-        accepted = ", ".join(map(str, known))
-        raise InputError(
-            f"--step {number}: no fields of such a step; accepted: {accepted}", "figure-of-steps"
-        )
-    return _at(run, folder, *known[number])
-
-
-def _frames(folder: Path) -> tuple[Run, list[tuple[float, int, str, str]]]:
-    """Return an evolution and, of each step with fields, its end, row and files."""
     if not (folder / "fields.pvd").is_file():
         raise InputError(
             f"{folder}: no steps there; accepted: the results of an evolution, with "
@@ -195,23 +183,29 @@ def _frames(folder: Path) -> tuple[Run, list[tuple[float, int, str, str]]]:
         fields, contact = (
             pyvista.PVDReader(folder / f"{kind}.pvd").datasets for kind in ("fields", "contact")
         )
-    times = [frame.time for frame in fields]
-    rows = [int(np.argmin(abs(run.steps["t"] - time))) for time in times]
-    files = ([Path(frame.path).name for frame in frames] for frames in (fields, contact))
-    return run, list(zip(times, rows, *files, strict=True))
-
-
-def _at(run: Run, folder: Path, time: float, row: int, fields: str, contact: str) -> Run:
-    """Return an evolution's results at a time, the end of the step of a row."""
+    times = run.steps["t"]
+    known = {1 + int(np.argmin(abs(times - frame.time))): k for k, frame in enumerate(fields)}
+    if number not in known:
+        accepted = ", ".join(map(str, known))
+        raise InputError(
+            f"--step {number}: no fields of such a step; accepted: {accepted}", "figure-of-steps"
+        )
     with _as_written(folder):
-        body, surface = (read_grid(folder / name) for name in (fields, contact))
-    title = f"{run.title}, t = {time:.3g}".lstrip(", ")
-    table = _moved({**run.table, **run.tables[row]}, body)
-    own = {"table": table, "body": body, "surface": surface, "opposite": None}
-    assert run.steps is not None
-    columns = {name: column[row] for name, column in run.steps.items()}
-    own["motions"] = _motions(run.moving, columns)
-    return replace(run, title=title, step=row + 1, steps=None, tables=(), **own)
+        frames = [of_all[known[number]] for of_all in (fields, contact)]
+        body, surface = (read_grid(folder / Path(frame.path).name) for frame in frames)
+    columns = {name: column[number - 1] for name, column in run.steps.items()}
+    return replace(
+        run,
+        title=f"{run.title}, t = {frames[0].time:.3g}".lstrip(", "),
+        table=_moved({**run.table, **run.tables[number - 1]}, body),
+        body=body,
+        surface=surface,
+        opposite=None,
+        motions=_motions(run.moving, columns),
+        step=number,
+        steps=None,
+        tables=(),
+    )
 
 
 def read_grid(path: Path) -> Any:
