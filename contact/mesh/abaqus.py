@@ -178,12 +178,7 @@ def _motion(lines: Sequence[str]) -> tuple[Array, Array]:
 
 @dataclass
 class Deck:
-    """Nodes, elements, sets and surfaces by number and by name.
-
-    The key of a name of an instance stands behind that of the instance; ``names`` has both as they
-    were given, and ``instances`` the offset of the numbers of each. Numbers and names without an
-    instance are those of `home`, which `enter` sets, with its motion and their `offset`.
-    """
+    """Nodes, elements, sets and surfaces by number and by key: INSTANCE.NAME or NAME, capitals."""
 
     points: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[str, list[int]] = field(default_factory=dict)
@@ -191,9 +186,9 @@ class Deck:
     nodes_of: dict[str, list[str]] = field(default_factory=dict)
     sets: dict[str, list[Member]] = field(default_factory=dict)
     surfaces: dict[str, tuple[str, list[tuple[Member, str]]]] = field(default_factory=dict)
-    names: dict[str, tuple[str, str]] = field(default_factory=dict)
-    instances: dict[str, int] = field(default_factory=dict)
-    home: str = ""
+    names: dict[str, tuple[str, str]] = field(default_factory=dict)  #: instance and name of keys
+    instances: dict[str, int] = field(default_factory=dict)  #: offset of the numbers of each
+    home: str = ""  #: instance of names and numbers without one, with `offset` and `motion`
     offset: int = 0
     motion: tuple[Array, Array] | None = None
 

@@ -115,11 +115,7 @@ class Shape:
 
     @property
     def serendipity(self) -> list[tuple[Nodes, Nodes, Array]]:
-        """The nodes of degree 2 in faces, (k,), their corners, and weights of the other nodes.
-
-        Then those in the cell. With values interpolated there a serendipity function is one of
-        degree 2.
-        """
+        """Nodes of degree 2 in faces, (k,), their corners, weights of other nodes; of the cell."""
         found: list[tuple[Nodes, Nodes, Array]] = []
         dofs = _element(self, 2).entity_dofs
         for dim in range(2, self.dim + 1):
@@ -258,12 +254,9 @@ FACES: dict[str, tuple[tuple[int, ...], ...]] = {
 
 
 def simplices(rows: Nodes, dim: int) -> Nodes:
-    """Return cells or facets cut into simplices, shape (cells, simplices, dim + 1).
-
-    They are given by their corners in VTK's order, shape (cells, corners), and their dimension. A
-    cell is the cone of its smallest corner over the faces without it, and so are these: the
-    diagonal of a face begins at its smallest corner on both sides (Dompierre et al.).
-    """
+    """Return cells of a dimension, by corners in VTK's order, as simplices, (cells, k, dim + 1)."""
+    # A cell is the cone of its smallest corner over the faces without it, and so are these: the
+    # diagonal of a face begins at its smallest corner on both sides (Dompierre et al.).
     count = rows.shape[1]
     if count == dim + 1:
         return rows[:, None]

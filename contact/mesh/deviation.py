@@ -57,18 +57,14 @@ def deviations(
     levels: int = 0,
     values: Array | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Return c of the edges of each facet, its uncertainty, and its largest change. Collective.
+    """Return c > 0 outwards, its uncertainty and largest change, (f, edges). Collective.
 
-    c is positive outwards. The uncertainty is the spread of c among the fits at the corners, large
-    where the curvature jumps, plus a quarter of the change of c from one edge to the next. The
-    largest change is that to the corners and to the vertices beyond them; both are zero on circles.
-    All have the shape (f, edges).
-
-    The facets are those of this rank, with the global numbers of their corners, (f, c),
-    coordinates, (f, c, d), and normals, (f, d). `levels` is how often straight edges have been cut
-    in two (`Domain.levels`): c is then that of the edges before, taken at their ends, where all of
-    the turn is. With values of a function at the corners, (f, c), infinite where it has none, c is
-    that of its height above linear interpolation along the edges.
+    The uncertainty is the spread of c among the fits at the corners, plus a quarter of the change
+    of c from one edge to the next. The largest change is that to the corners and to the vertices
+    beyond them; both are zero on circles. The facets of this rank are given by global numbers of
+    corners, (f, c), coordinates, (f, c, d), and normals, (f, d). After `levels` uniform refinements
+    c is that of the edges before, taken at their ends, where all of the turn is. With values at the
+    corners, (f, c), infinite where there are none, c is that of these above linear ones.
     """
     count = len(names)
     arrays = (names, corners, normal, *([] if values is None else [values]))

@@ -74,11 +74,8 @@ def meet(one: str, other: str) -> bool:
 def disjoint_pieces(
     comm: MPI.Intracomm, count: int, parts: Iterable[Indices]
 ) -> list[tuple[tuple[int, ...], Indices]]:
-    """Divide the facets 0, ..., count - 1 into pieces in the same of some parts. Collective.
-
-    A piece is the parts by their positions, and the facets in exactly these; all ranks have the
-    same ones in the same order, some without facets.
-    """
+    """Divide facets 0, ..., count - 1 into pieces: positions of parts, facets in exactly these."""
+    # Collective: all ranks have the same pieces in the same order, some without facets.
     numbers, combined = combinations(count, parts)
     own = {combined[k]: np.flatnonzero(numbers == k).astype(np.int32) for k in np.unique(numbers)}
     there = sorted(set().union(*comm.allgather(tuple(own))) - {()})
@@ -98,10 +95,7 @@ def known_name(kind: str, name: str, names: Mapping[str, Indices]) -> str:
 
 @dataclass(frozen=True)
 class ExtendedMeasure:
-    """A measure of UFL over a half plane, times the extent of the body there.
-
-    It is used like a measure of UFL: it multiplies an integrand from the right.
-    """
+    """A measure of UFL over a half plane, times the extent of the body there."""
 
     measure: ufl.Measure  #: dx or ds of the mesh
     extent: Expr  #: 2 pi r, the length of the ring through a point
@@ -120,12 +114,9 @@ Measure: TypeAlias = ufl.Measure | ExtendedMeasure
 
 
 def compiled(form: ufl.Form) -> fem.Form:
-    """Compile a form of one domain's measures, its subdomains renumbered from 0. Collective.
-
-    UFL's signature of a form, by which FFCx finds compiled code, contains the numbers of
-    subdomains: an integrand on another part would be compiled again. Subdomains with the same
-    integrals become one.
-    """
+    """Compile a form of one domain's measures, its subdomains renumbered from 0. Collective."""
+    # UFL's signature of a form, by which FFCx finds compiled code, contains the numbers of
+    # subdomains: an integrand on another part would be compiled again.
     everywhere, subdomains = [], defaultdict(list)
     for integral in form.integrals():
         numbers = integral.subdomain_id()
@@ -499,10 +490,7 @@ def with_names(
     regions: Mapping[str, Indices],
     size: float | None = None,
 ) -> Domain:
-    """Make a domain of owned exterior facets and cells by name, none empty. Collective.
-
-    Without regions, all cells are the region ``body``.
-    """
+    """Make a domain of owned exterior facets and cells by name, none empty. Collective."""
     exterior_facets(mesh)
     if not regions:
         count = mesh.topology.index_map(mesh.topology.dim).size_local
@@ -527,10 +515,7 @@ def on_axis(domain: Domain, points: Array) -> NDArray[np.bool_]:
 
 
 def revolved(domain: Domain) -> Domain:
-    """Return the body of revolution of a half plane; nodes near the axis move onto it. Collective.
-
-    Refuses meshes that are not plane, or lie on the other side of the axis.
-    """
+    """Return the body of revolution of a half plane, nodes near the axis on it. Collective."""
     if domain.dim != 2:
         raise InputError(
             'space.kinematics: "axisymmetric" with a mesh in 3-D; accepted: a mesh in 2-D, '

@@ -73,10 +73,7 @@ def accumulated(index_map: IndexMap, rows: npt.NDArray[Any]) -> npt.NDArray[Any]
 def sums_at(
     index_map: IndexMap, at: npt.NDArray[np.integer[Any]], values: npt.ArrayLike
 ) -> npt.NDArray[np.float64]:
-    """Return the sums over all ranks of values at some local entities, (n, ...). Collective.
-
-    The entities have any shape, which that of the values begins with, if these are no number.
-    """
+    """Return the sums over all ranks of values at entities of any shape, (n, ...). Collective."""
     tail = np.shape(values)[np.ndim(at) :]
     rows = np.zeros((index_map.size_local + index_map.num_ghosts, *tail))
     np.add.at(rows, at, values)
@@ -102,10 +99,7 @@ def cells_at(mesh: dmesh.Mesh, facets: Indices) -> tuple[Indices, npt.NDArray[np
 
 
 def elongation(mesh: dmesh.Mesh, facets: Indices) -> float:
-    """Return the largest ratio, at least 1, of the diameter of cells to twice their facets' edge.
-
-    Collective. The edge is the shortest one of the facet; a ratio of 1 is usual.
-    """
+    """Return the largest diameter of cells over twice their facets' shortest edge. Collective."""
     behind, _ = cells_at(mesh, facets)
     dim, found = mesh.topology.dim, 1.0
     if facets.size:
@@ -137,10 +131,7 @@ def exterior_facets(mesh: dmesh.Mesh) -> Indices:
 
 
 def connected_components(space: fem.FunctionSpace) -> tuple[Indices, int]:
-    """Return the connected component of each owned node, shape (n,), and how many there are.
-
-    Collective. Nodes of one cell are connected; regions that share no nodes are not.
-    """
+    """Return the connected component of each owned node, (n,), and their number. Collective."""
     labels, count = distributed_components(space, space.dofmap.list)
     return labels[: space.dofmap.index_map.size_local], count
 
@@ -190,10 +181,7 @@ def graph_components(
 
 
 def paths(edges: npt.NDArray[np.integer[Any]], count: int) -> list[npt.NDArray[np.intp]]:
-    """Return the polylines of edges, (m, 2), between vertices, ordered by their first vertices.
-
-    An open one begins at its end of the smaller number, a closed one at its smallest vertex.
-    """
+    """Return the polylines of edges, (m, 2), each from its end, or vertex, of smallest number."""
     graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=(count, count)).tocsr()
     graph = graph + graph.T
     pieces, piece = csgraph.connected_components(graph, directed=False)

@@ -28,10 +28,7 @@ def geometry_nodes(domain: Domain, cells: Indices | None = None) -> Array:
 
 
 def jacobians(shape: Shape, of: Array, at: Array) -> Array:
-    """Return dx/dxi, (n, q, d, dim), of cells or facets by their nodes, (n, nodes, d), at points.
-
-    Of straight simplices q = 1, for all points.
-    """
+    """Return dx/dxi, (n, q, d, dim), of nodes (n, nodes, d) at points; straight simplices q = 1."""
     degree = shape.degree_of(of.shape[1])
     if shape.simplex and degree == 1:
         return np.swapaxes(of[:, 1:] - of[:, :1], 1, 2)[:, None]
@@ -39,11 +36,7 @@ def jacobians(shape: Shape, of: Array, at: Array) -> Array:
 
 
 def outward(shape: Shape, points: Array, inside: Array, at: Array) -> Array:
-    """Return the outward area vectors of facets at points, shape (f, q, d).
-
-    The nodes of the facets are `points`, (f, nodes, d); `inside` are points of the body behind
-    them, (f, d). Of straight simplices q = 1, for all points.
-    """
+    """Return outward area vectors at points, (f, q, d), of facets (f, nodes, d) before `inside`."""
     normal = area_vectors(jacobians(shape, points, at))
     away = points.mean(axis=1) - inside
     return np.asarray(normal * np.sign(np.einsum("fqd,fd->fq", normal, away))[..., None])
@@ -74,11 +67,7 @@ def area_vectors(jacobian: Array) -> Array:
 def facet_normals(
     domain: Domain, part: str, degree: int
 ) -> tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]], Array]:
-    """Return the outward area vectors of the facets of a part at their nodes of a degree.
-
-    The result has the cells of the facets, (f,), the numbers of these in their cells, (f,), and the
-    vectors, (f, q, d), q = 1 for straight simplices.
-    """
+    """Return the cells of the facets of a part, their numbers there, area vectors (f, q, d)."""
     return normals_at(domain, domain.facets(part), degree)
 
 
@@ -120,10 +109,7 @@ def inverse(matrix: Array) -> Array:
 
 
 def pulled_back(shape: Shape, of: Array, points: Array) -> Array:
-    """Return points, (n, dim), in reference coordinates: Newton's method.
-
-    Of cells, or of projected facets, by their nodes, shape (n, nodes, dim).
-    """
+    """Return points, (n, dim), in reference coordinates of cells, (n, nodes, dim), by Newton."""
     degree, at = shape.degree_of(of.shape[1]), np.repeat(shape.middle, len(points), axis=0)
     for _ in range(20):
         slope = np.einsum("pkr,pkd->pdr", shape.gradients(degree, at), of)
@@ -137,10 +123,7 @@ def pulled_back(shape: Shape, of: Array, points: Array) -> Array:
 
 
 def nearest_on_simplices(corners: Array, points: Array) -> Array:
-    """Return barycentric coordinates, (n, k), of the points nearest to given ones, (n, d).
-
-    Of segments or triangles by their corners, shape (n, k, d).
-    """
+    """Return barycentric coordinates, (n, k), of the points of simplices nearest to others."""
     edges = corners[:, 1:] - corners[:, :1]
     along = np.einsum("nkd,nd->nk", edges, points - corners[:, 0])
     own = barycentric(np.einsum("nkl,nl->nk", inverse(edges @ edges.swapaxes(1, 2)), along))
@@ -161,10 +144,7 @@ def nearest_on_simplices(corners: Array, points: Array) -> Array:
 def integration_weights(
     revolved: bool, shape: Shape, of: Array, at: Array, weights: Array
 ) -> Array:
-    """Return w_q |J| at points of a rule, (n, q); of a body of revolution 2 pi r w_q |J|.
-
-    Of cells or facets by their nodes, shape (n, nodes, d).
-    """
+    """Return w_q |J| at points of a rule, (n, q); of a body of revolution 2 pi r w_q |J|."""
     found = volume_factors(shape, of, at) * weights
     if not revolved:
         return found

@@ -23,18 +23,10 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Owners:
-    """Owners of nodes, whose global numbers are contiguous on each rank.
-
-    Attributes
-    ----------
-    comm
-        Communicator.
-    begins
-        The first number of each rank, and the number of all nodes, shape (ranks + 1,).
-    """
+    """Owners of nodes, whose global numbers are contiguous on each rank."""
 
     comm: MPI.Intracomm
-    begins: Numbers
+    begins: Numbers  #: the first number of each rank, and the number of all nodes, (ranks + 1,)
 
     @staticmethod
     def of(index_map: IndexMap, comm: MPI.Intracomm) -> Owners:
@@ -146,11 +138,9 @@ class Halo:
 def sparse_rows(
     rows: Numbers, entries: tuple[Numbers, Numbers, Array]
 ) -> tuple[Numbers, sparse.csr_array]:
-    """Return rows of a matrix of which entries are given, summed at each place.
+    """Return the ascending columns, (m,), and the matrix, (n, m), of entries in ascending rows.
 
-    The rows are ascending, shape (n,); entries are rows, columns and values, and those of other
-    rows are left out. The result has the global numbers of the columns, ascending, shape (m,), and
-    the matrix, shape (n, m).
+    Entries are rows, columns and values, summed at each place; those of other rows are left out.
     """
     row = np.searchsorted(rows, entries[0])
     inside = row < rows.size

@@ -145,11 +145,9 @@ ROUNDS = 3
 
 
 def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
-    """Return the interpolant of a function in a space on another mesh of the body. Collective.
-
-    On a refined mesh the new function equals the old one. A node of the new mesh slightly outside
-    of the old one, as on a curved boundary, gets the value of the closest cell.
-    """
+    """Return the interpolant of a function in a space on another mesh of the body. Collective."""
+    # A node slightly outside of the old mesh, as on a curved boundary, gets the value of the
+    # closest cell.
     made = fem.Function(space, name=coarse.name)
     cells = _covering(space)
     source = coarse.function_space
