@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from contact.mesh.cells import FACES, joined_facets, single_facets, unique_rows
 from contact.mesh.contents import ELEMENTS, Contents, Ints, Kind, decoded
+from contact.mesh.entities import places_of
 from contact.typing import Array
 
 #: Types of elements: beginnings of their names, and their dimension.
@@ -327,8 +328,8 @@ def _contents(found: Deck) -> Contents:
     for block, (kind, values) in enumerate(found.elements.items()):
         known = _element_type(kind)
         rows = np.array(values, dtype=np.int64).reshape(-1, known.nodes + 1)
-        nodes = np.minimum(np.searchsorted(tags, rows[:, 1:]), max(tags.size - 1, 0))
-        if tags.size == 0 or np.any(tags[nodes] != rows[:, 1:]):
+        nodes = places_of(rows[:, 1:], tags)
+        if np.any(nodes < 0):
             raise ValueError("it has elements whose nodes it does not have")
         if known == Kind("interval", 3):  # the middle one last, wherever the program has it
             middle = points[nodes].mean(axis=1, keepdims=True)

@@ -314,7 +314,10 @@ def check(contents: Contents) -> Cells:
     contents = with_one_shape(contents)
     shape = _check_kinds([kind for kind in contents.kinds if kind.dim == dim], dim)
     points = np.asarray(contents.points, dtype=float)
-    every = _all_cells(contents, points, shape)
+    pairs = zip(contents.blocks, contents.kinds, strict=True)
+    every = np.concatenate([nodes for (_, nodes), kind in pairs if kind.dim == dim])
+    every = in_dolfinx_order(shape, points, every)
+    every = every if _curved(points, every, shape) else every[:, : shape.corners]
     number = _number(every)
     first = np.unique(number, return_index=True)[1]
     parts = _parts(contents, shape, every[first, : shape.corners])
@@ -361,14 +364,6 @@ def _empty_groups(contents: Contents) -> dict[str, str]:
     return {
         name: f"the physical group {name!r} has no elements" for name in empty if name not in others
     }
-
-
-def _all_cells(contents: Contents, points: Array, shape: Shape) -> Ints:
-    """Return all cells in dolfinx's order, (m, k): by their corners unless some are curved."""
-    pairs = zip(contents.blocks, contents.kinds, strict=True)
-    rows = np.concatenate([nodes for (_, nodes), kind in pairs if kind.dim == shape.dim])
-    rows = in_dolfinx_order(shape, points, rows)
-    return rows if _curved(points, rows, shape) else rows[:, : shape.corners]
 
 
 def _check_named(usable: Mapping[str, Ints], reasons: Mapping[str, str], dim: int) -> None:

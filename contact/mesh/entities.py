@@ -44,6 +44,15 @@ def labels_of(names: Iterable[str], combined: Sequence[tuple[int, ...]]) -> dict
     }
 
 
+def places_of(
+    asked: npt.NDArray[np.integer[Any]], numbers: npt.NDArray[np.integer[Any]]
+) -> npt.NDArray[np.intp]:
+    """Return the places of numbers of any shape among different others, (n,); -1 for none."""
+    order = np.argsort(numbers)
+    at = np.append(order, -1)[np.searchsorted(numbers, asked, sorter=order)]
+    return np.where(np.append(numbers, 0)[at] == asked, at, -1)
+
+
 def owned_among(
     index_map: IndexMap, numbers: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.intp], Indices]:

@@ -30,6 +30,7 @@ import numpy as np
 from contact.errors import InputError
 from contact.mesh.cells import FACES, joined_facets
 from contact.mesh.contents import Contents, Ints, Kind, decoded, in_space
+from contact.mesh.entities import places_of
 
 
 @contextmanager
@@ -99,10 +100,7 @@ def model_contents(model: Any, entities_are_groups: bool = False) -> Contents:
         first = len(blocks)
         for kind, _, nodes in zip(*model.mesh.getElements(dim, entity), strict=True):
             name, _, _, count, *_ = model.mesh.getElementProperties(kind)
-            nodes = nodes.astype(np.int64).reshape(-1, count)
-            rows = np.minimum(np.searchsorted(tags, nodes), max(tags.size - 1, 0))
-            if tags.size == 0 or np.any(tags[rows] != nodes):
-                raise InputError("it has elements whose nodes it does not have", "mesh-file")
+            rows = places_of(nodes.astype(np.int64).reshape(-1, count), tags)
             blocks.append((name.split()[0].lower(), rows))
         at[dim, entity] = range(first, len(blocks))
     made = Contents(points.reshape(-1, 3)[order], blocks, by_groups=True)

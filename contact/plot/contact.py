@@ -148,7 +148,8 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
     _focus(rows[0], table["pressure"][inside], 0.0)
     if np.all(seen == "open"):
-        _tell_open(rows[0])
+        there = {"transform": rows[0].transAxes, "bbox": {"facecolor": "white", "lw": 0}}
+        rows[0].text(0.5, 0.5, "no contact", ha="center", va="center", **there)
     if frictional:
         rows[1].plot(
             where, tau, color=ORANGE, marker=mark, label=r"tangential stress $-\sigma_\tau\cdot t$"
@@ -182,12 +183,6 @@ def _draw_opposite(
     order = np.argsort(there)
     pressure = opposite["pressure"][own][order]
     ax.plot(there[order], pressure, ":", color=GREY, lw=1.0, label="pressure on the other side")
-
-
-def _tell_open(ax: Axes) -> None:
-    """Say that there is no contact, where nothing else is seen."""
-    there = {"transform": ax.transAxes, "bbox": {"facecolor": "white", "lw": 0}}
-    ax.text(0.5, 0.5, "no contact", ha="center", va="center", **there)
 
 
 def _focus(ax: Axes, values: Array, low: float) -> None:

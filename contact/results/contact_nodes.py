@@ -17,7 +17,7 @@ from contact.errors import InputError, counted
 from contact.interface.mortar.lumping import JumpRows, Lumping
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.cells import Shape, shape_of
-from contact.mesh.entities import paths
+from contact.mesh.entities import paths, places_of
 from contact.mesh.owners import Owners
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import dissipated
@@ -317,11 +317,8 @@ def _at(known: NDArray[np.int64], numbers: NDArray[np.int64], values: Values) ->
     """Return values by numbers at some that are known: NaN, or -1, where there is none."""
     none = np.nan if values.dtype.kind == "f" else -1
     found = np.full((len(known), *values.shape[1:]), none, dtype=values.dtype)
-    order = np.argsort(numbers)
-    place = np.searchsorted(numbers, known, sorter=order)
-    there = place < numbers.size
-    there[there] = numbers[order[place[there]]] == known[there]
-    found[there] = values[order[place[there]]]
+    place = places_of(known, numbers)
+    found[place >= 0] = values[place[place >= 0]]
     return found
 
 
