@@ -28,7 +28,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import on_root
 from contact.results.contact_nodes import Grid, Values, contact_surface
-from contact.results.fields import DerivedFields, linear, nodal_unknowns, unknowns
+from contact.results.fields import DerivedFields, cell_function, linear, nodal_unknowns, unknowns
 from contact.results.solution import Solution
 
 #: A time, and the state then.
@@ -226,10 +226,8 @@ def _at_corners(
     found = [linear(f) for f in unknowns(problem.body, state.x).values()]
     means, mesh = derived.cell_means(), problem.domain.mesh
     for name, columns in derived.columns.items():
-        space = fem.functionspace(mesh, ("DG", 0, derived.shapes[name]))
-        found.append(fem.Function(space, name=name))
-        values = found[-1].x.array.reshape(-1, columns.stop - columns.start)
-        values[space.dofmap.list[: len(means), 0]] = means[:, columns]
+        values = means[:, None, columns]
+        found.append(cell_function(name, mesh, 0, derived.shapes[name], values))
     return found
 
 

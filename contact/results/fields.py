@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 from ufl.core.expr import Expr
@@ -60,6 +61,17 @@ def nodal_function(
     # Two spaces of one mesh need not number their nodes alike.
     target = function.function_space.dofmap.list
     function.x.array.reshape(-1, values.shape[1])[target] = values[source.dofmap.list]
+    function.x.scatter_forward()
+    return function
+
+
+def cell_function(
+    name: str, mesh: dmesh.Mesh, degree: int, shape: tuple[int, ...], values: Array
+) -> fem.Function:
+    """Return a discontinuous function by its values in the owned cells, (cells, nodes, k)."""
+    function = fem.Function(fem.functionspace(mesh, ("DG", degree, shape)), name=name)
+    dofs = function.function_space.dofmap.list[: len(values)]
+    function.x.array.reshape(-1, values.shape[2])[dofs] = values
     function.x.scatter_forward()
     return function
 
@@ -193,6 +205,11 @@ class DerivedFields:
             for name, size, end in zip(self.shapes, sizes, ends, strict=True)
         }
 
+    @property
+    def _size(self) -> int:
+        """The number of all components."""
+        return sum(math.prod(shape) for shape in self.shapes.values())
+
     def _expression(self, material: Material, at: fem.Function) -> Expr:
         """Return all components of a material's fields, one after the other."""
         fields = values_of(BODY, fields_of(self.body, material, at)).values()
@@ -267,24 +284,19 @@ class DerivedFields:
     def cells(self) -> dict[str, fem.Function]:
         """Return the fields as they are: discontinuous, of degree 0 for P1 and 1 for P2."""
         mesh, degree = self.body.domain.mesh, self.body.degree - 1
-        made = {
-            name: fem.Function(fem.functionspace(mesh, ("DG", degree, shape)), name=name)
-            for name, shape in self.shapes.items()
-        }
-        corners = 1 if degree == 0 else shape_of(mesh).corners
+        corners, owned = shape_of(mesh).corners, mesh.topology.index_map(self.body.dim).size_local
+        every = np.zeros((owned, 1 if degree == 0 else corners, self._size))
         for chosen, values in self.chunks():
-            for name, columns in self.columns.items():
-                dofs = made[name].function_space.dofmap.list[chosen]
-                array = made[name].x.array.reshape(-1, columns.stop - columns.start)
-                array[dofs] = values[:, :corners, columns]
-        for function in made.values():
-            function.x.scatter_forward()
-        return made
+            every[chosen] = values[:, :corners]
+        return {
+            name: cell_function(name, mesh, degree, self.shapes[name], every[..., columns])
+            for name, columns in self.columns.items()
+        }
 
     def cell_means(self) -> Array:
         """Return the fields of the owned cells, at degree 2 means of their corners, (cells, k)."""
-        mesh, size = self.body.domain.mesh, sum(math.prod(s) for s in self.shapes.values())
-        found = np.zeros((mesh.topology.index_map(mesh.topology.dim).size_local, size))
+        mesh = self.body.domain.mesh
+        found = np.zeros((mesh.topology.index_map(mesh.topology.dim).size_local, self._size))
         for chosen, values in self.chunks():
             found[chosen] = values[:, : shape_of(mesh).corners].mean(axis=1)
         return found
@@ -313,12 +325,11 @@ class DerivedFields:
         space, volume, groups = self.body.space, volumes(self.body.domain), self.groups
         index_map, links = space.dofmap.index_map, space.dofmap.list
         nodes = index_map.size_local + index_map.num_ghosts
-        count = sum(math.prod(shape) for shape in self.shapes.values())
-        sums = np.zeros((self.group_count, nodes, count + 1))
+        sums = np.zeros((self.group_count, nodes, self._size + 1))
         for chosen, values in self.chunks():
             dofs = links[chosen]
             weight = np.broadcast_to(volume[chosen, None, None], (*dofs.shape, 1))
-            at_nodes = np.broadcast_to(values, (*dofs.shape, count)) * weight
+            at_nodes = np.broadcast_to(values, (*dofs.shape, self._size)) * weight
             every = np.concatenate([at_nodes, weight], axis=2)
             np.add.at(sums, (groups[chosen, None], dofs), every)
         for group in sums:
@@ -339,15 +350,10 @@ class DerivedFields:
                 name: nodal_function(name, space, means[0][:, columns], self.shapes[name])
                 for name, columns in self.columns.items()
             }
-        made = {}
-        links, degree = space.dofmap.list[: groups.size], self.body.degree
+        links, made = space.dofmap.list[: groups.size], {}
         for name, columns in self.columns.items():
-            apart = fem.functionspace(space.mesh, ("DG", degree, self.shapes[name]))
-            made[name] = fem.Function(apart, name=name)
-            dofs = made[name].function_space.dofmap.list[: groups.size]
-            array = made[name].x.array.reshape(-1, columns.stop - columns.start)
-            array[dofs] = means[groups[:, None], links, columns]
-            made[name].x.scatter_forward()
+            values, shape = means[groups[:, None], links, columns], self.shapes[name]
+            made[name] = cell_function(name, space.mesh, self.body.degree, shape, values)
         return made
 
 

@@ -101,6 +101,14 @@ def _share(problem: ContactProblem, axis: int) -> float:
     return float(problem.domain.resultant(np.eye(problem.dim)[axis])[axis])
 
 
+def _by_layer(problem: ContactProblem, state: State, weights: Array) -> Array:
+    """Return the derivatives by unknowns of a weighted sum of the pressures of layers, (n,)."""
+    by_x = _no_weights(problem)
+    layer = problem.interface.foundation.layer_gradient(problem.nodal(state))
+    problem.nodes.add_jump_transposed(weights[:, None] * layer, by_x)
+    return by_x
+
+
 @dataclass(frozen=True)
 class ContactForce:
     """A component of the force of the body on the foundations, as ``contact_force_x``."""
@@ -121,12 +129,8 @@ class ContactForce:
         share = np.where(_of_contact(problem, self.contact), _share(problem, self.axis), 0.0)
         by_force = np.zeros_like(nodes.normal)
         by_force[:, self.axis] = share * nodes.weight
-        layer = problem.interface.foundation.layer_gradient(problem.nodal(state))
-        by_x = np.zeros_like(problem.body.owned_part(state.x))
-        nodes.add_jump_transposed(
-            (share * nodes.weight * nodes.normal[:, self.axis])[:, None] * layer, by_x
-        )
-        return by_x, by_force
+        along = share * nodes.weight * nodes.normal[:, self.axis]
+        return _by_layer(problem, state, along), by_force
 
 
 class Largest(ABC):
@@ -165,12 +169,8 @@ class MaxPressure(Largest):
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        nodes = problem.nodes
         at = _largest(problem, self.values(problem, state))
-        layer = problem.interface.foundation.layer_gradient(problem.nodal(state))
-        by_x = np.zeros_like(problem.body.owned_part(state.x))
-        nodes.add_jump_transposed(at[:, None] * layer, by_x)
-        return by_x, at[:, None] * nodes.normal
+        return _by_layer(problem, state, at), at[:, None] * problem.nodes.normal
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ class MaxDisplacement(Largest):
         body, u = problem.body, self._nodal(problem, state)
         length = np.linalg.norm(u, axis=1)
         at = _largest(problem, length) / np.maximum(length, np.finfo(float).tiny)
-        by_x = np.zeros_like(body.owned_part(state.x))
+        by_x = _no_weights(problem)
         body.nodal(by_x)[:, : problem.dim] = at[:, None] * u
         return by_x, np.zeros_like(problem.nodes.normal)
 
@@ -250,14 +250,12 @@ class FoundationCharge:
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
-        found = 0.0
-        for law, jump, pressure in problem.interface.acting(state.x, state.forces):
-            found += law.nodes.sum(law.charge(jump, pressure))
-        return found
+        acting = problem.interface.acting(state.x, state.forces)
+        return float(sum(law.nodes.sum(law.charge(jump, p)) for law, jump, p in acting))
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        by_x = np.zeros_like(problem.body.owned_part(state.x))
+        by_x = _no_weights(problem)
         for law, jump, pressure in problem.interface.acting(state.x, state.forces):
             full = law is problem.interface.foundation
             slope = -law.charge_block(jump, pressure, full)[:, -1] / law.phi_scale
