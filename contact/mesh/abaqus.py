@@ -101,18 +101,15 @@ def included_files(file: Path) -> list[Path]:
     return [*dict.fromkeys([file, *(inner for inner, _ in _lines(file))])]
 
 
-def _blocks(file: Path) -> Iterator[Block]:
-    """Yield keywords with their options and data lines."""
-    block: Block | None = None
+def _blocks(file: Path) -> list[Block]:
+    """Return keywords with their options and data lines."""
+    found: list[Block] = []
     for _, line in _lines(file):
         if line.startswith("*"):
-            if block is not None:
-                yield block
-            block = (*_keyword(line), [])
-        elif block is not None:
-            block[2].append(line)
-    if block is not None:
-        yield block
+            found.append((*_keyword(line), []))
+        elif found:
+            found[-1][2].append(line)
+    return found
 
 
 def _split(line: str) -> list[str]:

@@ -9,7 +9,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -159,7 +158,13 @@ def draw_plane(picture: Picture) -> Figure:
     )
     outline = edges.points[edges.lines.reshape(-1, 3)[:, 1:], :2]
     places = np.asarray(picture.skin.points)[:, :2]
-    _colour(ax, picture)
+    flat = picture.skin.triangulate()
+    mesh, values = Triangulation(*flat.points[:, :2].T, flat.regular_faces), flat["values"]
+    if "values" in flat.cell_data:
+        shades = {"norm": picture.norm, "cmap": picture.colours}
+        ax.tripcolor(mesh, facecolors=values, rasterized=True, **shades)
+    else:
+        smooth(ax, mesh, values, picture.norm, picture.colours)
     # Dashes would be those of an edge each: none where edges are short.
     ax.add_collection(LineCollection(list(outline), colors="black", lw=0.5))
     found = profiles(run, picture.scale, places, picture.near)
@@ -191,17 +196,6 @@ def _bar(figure: Figure, picture: Picture) -> None:
         )
         return
     colour_bar(figure, figure.axes, picture.norm, picture.colours, picture.label)
-
-
-def _colour(ax: Axes, picture: Picture) -> None:
-    """Draw the coloured body."""
-    skin = picture.skin.triangulate()
-    mesh = Triangulation(*skin.points[:, :2].T, skin.regular_faces)
-    values, norm, colours = skin["values"], picture.norm, picture.colours
-    if "values" in skin.cell_data:
-        ax.tripcolor(mesh, facecolors=values, norm=norm, cmap=colours, rasterized=True)
-    else:
-        smooth(ax, mesh, values, norm, colours)
 
 
 def draw_space(picture: Picture) -> Figure:

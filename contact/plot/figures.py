@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -83,11 +84,8 @@ def plot(
     step: int | None = None,
 ) -> list[Path]:
     """Draw the figures of a run, or of its step, into its folder; return the files. On one rank."""
-
-    def read() -> Run:
-        return read_run(folder) if step is None else read_step(folder, step)
-
-    return _added(folder, lambda new: draw(read(), new, fields, formats, look))
+    read = read_run if step is None else partial(read_step, number=step)
+    return _added(folder, lambda new: draw(read(folder), new, fields, formats, look))
 
 
 def flat(option: str) -> InputError:

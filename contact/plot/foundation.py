@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pyvista
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from contact.model.obstacle import Shape
 from contact.plot.contact import ends
@@ -49,17 +48,6 @@ class Scaling:
     more: Array  #: f, shape (n,)
     largest: float  #: the scale up to which bodies do not overlap it visibly, and it is shallow
 
-    @staticmethod
-    def of(
-        approach: Array, distance: Array, more: Array, diameter: float, seen: NDArray[np.bool_]
-    ) -> Scaling:
-        """Return it for a diameter of the part that is shown, and which nodes are seen in it."""
-        closing = seen & (approach > more)
-        room = (distance + UNSEEN * diameter - more)[closing] / (approach - more)[closing]
-        height = float(np.ptp(more[seen])) if seen.any() else 0.0
-        shallow = SHALLOW * diameter / height if height > 0 else np.inf
-        return Scaling(approach, distance, more, min(shallow, float(room.min(initial=np.inf))))
-
 
 def scalings(run: Run, table: Table, box: Array | None) -> list[Scaling]:
     """Return how a foundation, or other body, may be drawn in a box, (2, d), the best first."""
@@ -69,16 +57,24 @@ def scalings(run: Run, table: Table, box: Array | None) -> list[Scaling]:
         seen = np.all((points >= box[0]) & (points <= box[1]), axis=1)
         diameter = float(np.ptp(box, axis=0).max())
     approach, distance = table["u_n"], np.maximum(table["gap"], 0.0)
-    if not np.all(table["rigid"]):
-        return [Scaling.of(approach, distance, np.zeros_like(distance), diameter, seen)]
-    approach, distance = approach + table["moved"], table["gap"] + table["moved"]
-    touching = table["status"] != "open"
-    nearest = distance[touching if touching.any() else slice(None)].min()
-    found = [np.full_like(distance, nearest)]
-    sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if run.plane and sizes[-1] <= CURVED * sizes[0]:
-        found.append(distance)
-    return [Scaling.of(approach, distance, more, diameter, seen) for more in found]
+    profiles = [np.zeros_like(distance)]
+    if np.all(table["rigid"]):
+        approach, distance = approach + table["moved"], table["gap"] + table["moved"]
+        touching = table["status"] != "open"
+        nearest = distance[touching if touching.any() else slice(None)].min()
+        profiles = [np.full_like(distance, nearest)]
+        sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if run.plane and sizes[-1] <= CURVED * sizes[0]:
+            profiles.append(distance)
+    found = []
+    for more in profiles:
+        closing = seen & (approach > more)
+        room = (distance + UNSEEN * diameter - more)[closing] / (approach - more)[closing]
+        height = float(np.ptp(more[seen])) if seen.any() else 0.0
+        shallow = SHALLOW * diameter / height if height > 0 else np.inf
+        largest = min(shallow, float(room.min(initial=np.inf)))
+        found.append(Scaling(approach, distance, more, largest))
+    return found
 
 
 def magnification(run: Run, box: Array | None = None) -> float:

@@ -205,13 +205,6 @@ class Zone:
             normal = np.where(abs(normal) > SNAPPED, np.sign(normal), 0.0)
         return Zone(corners, area, moved, pressure, normal)
 
-    def lifted(self, size: float) -> Any:
-        """Return the deformed triangles, a little in front of a body of a size (length)."""
-        out = self.area / np.linalg.norm(self.area, axis=1)[:, None]
-        mesh = polygons(self.corners + self.displacement + LIFTED * size * out[:, None])
-        mesh["pressure"] = self.pressure.ravel()
-        return mesh
-
 
 class Sight(NamedTuple):
     """How a body is seen."""
@@ -307,8 +300,12 @@ class Scene:
         # The bar of colours is that of the mesh that is added last.
         if grid.n_cells:
             _add_body(plotter, grid, **look)
-        if self.painted and self.zone.pressure.any():
-            mesh = self.zone.lifted(float(np.ptp(self.body.points, axis=0).max()))
+        zone = self.zone
+        if self.painted and zone.pressure.any():  # a little in front of the body
+            size = float(np.ptp(self.body.points, axis=0).max())
+            out = zone.area / np.linalg.norm(zone.area, axis=1)[:, None]
+            mesh = polygons(zone.corners + zone.displacement + LIFTED * size * out[:, None])
+            mesh["pressure"] = zone.pressure.ravel()
             plotter.add_mesh(mesh, show_scalar_bar=False, **self.colours)
 
     def window(self, label: str) -> Any:

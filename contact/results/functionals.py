@@ -32,6 +32,7 @@ from contact.results.resultants import (
     NAMES,
     DrivenPart,
     columns_of,
+    driven_part,
     holding,
     name_ends,
     nodes_of,
@@ -308,18 +309,15 @@ def reactions(problem: ContactProblem) -> Functionals:
 
 def driven_displacements(problem: ContactProblem) -> Functionals:
     """Return the components of the displacement of the driven part. Collective."""
-    driven, axes = DrivenPart.of(problem), AXES[: problem.dim]
-    if driven is None:
+    on, axes = driven_part(problem.description), enumerate(AXES[: problem.dim])
+    if on is None:
         return {}
-    return {
-        f"driven_{axis}": Weighted(partial(_mean, part=driven.on, axis=i))
-        for i, axis in enumerate(axes)
-    }
+    return {f"driven_{x}": Weighted(partial(_mean, part=on, axis=i)) for i, x in axes}
 
 
 def driving_forces(problem: ContactProblem) -> Functionals:
     """Return the components of the force on the driven part. Collective."""
-    axes = AXES[: problem.dim] if DrivenPart.of(problem) is not None else ""
+    axes = AXES[: problem.dim] if driven_part(problem.description) is not None else ""
     return {f"driven_force_{axis}": partial(_driving, axis=i) for i, axis in enumerate(axes)}
 
 

@@ -119,29 +119,21 @@ def nodes_of(problem: ContactProblem, part: str) -> NDArray[np.int32]:
 class DrivenPart:
     """The part that is moved or loaded in time: its way and its force make a loop."""
 
-    on: str
-    nodes: NDArray[np.int32]  #: owned ones of the part
     #: Where residuals are reactions of its supports, and the matrices of these; `holding`.
     held: Sequence[tuple[NDArray[np.int32], Array]]
     loads: Loads  #: those on the part alone
 
     @staticmethod
     def of(problem: ContactProblem) -> DrivenPart | None:
-        """Return the first part that moves in time, or has a load; None without any. Collective."""
-        on = _driven(problem.description)
+        """Return the driven part of a problem; None without any. Collective."""
+        on = driven_part(problem.description)
         if on is None:
             return None
         parts, body = set(members(on)), problem.body
         held = [at for part, at in holding(problem, electric=False).items() if part in parts]
         within = [load.on for load in problem.description.loads if load.on]
         within = [name for name in within if parts >= set(members(name))]
-        return DrivenPart(on, nodes_of(problem, on), held, body.loads_along(body.space, within))
-
-    def way(self, problem: ContactProblem, state: State) -> Array:
-        """Return the mean displacement of its nodes, shape (d,). Collective."""
-        x = problem.body.nodal(state.x)[self.nodes, : problem.dim]
-        total = problem.comm.allreduce(np.append(x.sum(axis=0), len(x)), op=MPI.SUM)
-        return np.asarray(total[:-1] / max(total[-1], 1.0))
+        return DrivenPart(held, body.loads_along(body.space, within))
 
     def force(self, problem: ContactProblem, state: State) -> Array:
         """Return the force on it, of its own supports and loads, shape (d,). Collective."""
@@ -153,7 +145,8 @@ class DrivenPart:
         return np.asarray(problem.comm.allreduce(total, op=MPI.SUM))
 
 
-def _driven(body: Body) -> str | None:
+def driven_part(body: Body) -> str | None:
+    """Return the first part that moves in time, or has a load; None without any."""
     for fixed in body.fixed:
         given = [value for key, value in fixed.given.items() if key != "potential"]
         moves = any(not is_zero(component) for component in given)

@@ -28,7 +28,7 @@ from contact.results.contact_nodes import (
 )
 from contact.results.error_estimate import Estimate, Intervals
 from contact.results.fields import Deformation, DerivedFields, unknowns
-from contact.results.functionals import MaxDisplacement
+from contact.results.functionals import MaxDisplacement, driven_displacements
 from contact.results.options import OutputOptions, Units
 from contact.results.quantities import values_of
 from contact.results.quantity import STEPS
@@ -81,6 +81,7 @@ class StepRecorder:
             self._before = replace(self._before, enthalpy=last.enthalpy)
         self._rounding = 0.0 if last is None else last.rounding
         self._driven = DrivenPart.of(problem)
+        self._ways = driven_displacements(problem).values()
 
     def record(self, state: State, outcome: Outcome) -> StepRecord:
         """Return the record of a step that follows the last one. Collective."""
@@ -89,7 +90,8 @@ class StepRecorder:
         solution = Solution(problem, state, outcome, [*outcome.records], outcome.counters, "", {})
         solution.energies = energies
         if self._driven is not None:
-            solution.driven = self._driven.way(problem, state), self._driven.force(problem, state)
+            way = np.array([mean(problem, state) for mean in self._ways])
+            solution.driven = way, self._driven.force(problem, state)
         row = values_of(STEPS, solution)
         self._rounding = max(self._rounding, outcome.residuals.equilibrium_rounding)
         return StepRecord(state, row, energies.enthalpy, self._rounding)
