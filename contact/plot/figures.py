@@ -50,7 +50,7 @@ def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Galle
                 found["contact"] = draw_line(run) if run.plane else contact_figure(run, look)
                 if run.title:
                     found["contact"].suptitle(fitted(run.title), fontsize="large")
-            if run.steps is not None:
+            if run.steps:
                 found |= steps_figures(run)
         for field in fields or [field for field in DEFORMED if field in run.body.point_data]:
             made = picture(run, field, look=look)

@@ -51,7 +51,7 @@ class Run:
     #: Their displacement, and rotation in radians about the origin, shape (6,).
     motions: Mapping[int, Array] = field(default_factory=dict)
     step: int | None = None  #: its number, from 1; None for the last results
-    steps: Table | None = None  #: columns of ``steps.csv``, of an evolution
+    steps: Table = field(default_factory=dict)  #: columns of ``steps.csv``
     tables: Sequence[Table] = ()  #: the contact nodes of each step
 
     @property
@@ -130,7 +130,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             shapes=shapes,
             moving=moving,
             motions=_motions(moving, rigid_columns(dict(about), "displacement", "rotation")),
-            steps=_columns(folder / "steps.csv") if "steps.csv" in files else None,
+            steps=_columns(folder / "steps.csv") if "steps.csv" in files else {},
             tables=_tables(folder / "contact-steps.csv") if "steps.csv" in files else (),
         )
 
@@ -178,7 +178,6 @@ def read_step(folder: Path, number: int) -> Run:
             "figure-of-steps",
         )
     run = read_run(folder)
-    assert run.steps is not None  # where there are fields in time, there are steps
     with _as_written(folder):
         fields, contact = (
             pyvista.PVDReader(folder / f"{kind}.pvd").datasets for kind in ("fields", "contact")
@@ -203,7 +202,7 @@ def read_step(folder: Path, number: int) -> Run:
         opposite=None,
         motions=_motions(run.moving, columns),
         step=number,
-        steps=None,
+        steps={},
         tables=(),
     )
 

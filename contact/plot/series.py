@@ -58,7 +58,6 @@ ROUNDING = 1e-6
 
 def steps_figures(run: Run) -> dict[str, Figure]:
     """Return the figures of an evolution by name: a loop of driven parts, zones in 2-D."""
-    assert run.steps is not None
     found = {"energy": draw_energies(run)}
     moves = next((m for m in DRIVEN if any(k.startswith(f"{m}_x") for k in run.steps)), None)
     if moves is not None:
@@ -72,13 +71,11 @@ def steps_figures(run: Run) -> dict[str, Figure]:
 
 def _course(run: Run, name: str) -> Array:
     """Return a column of ``steps.csv`` after its value 0 in the reference configuration."""
-    assert run.steps is not None
     return np.concatenate([[0.0], run.steps[name]])
 
 
 def draw_loop(run: Run, moves: str) -> Figure:
     """Draw the forces on the parts that move over their displacements, along each axis of these."""
-    assert run.steps is not None
     names = "xyz"[: len(run.axes)]
     bodies = [
         name.removeprefix(f"{moves}_x") for name in run.steps if name.startswith(f"{moves}_x")
@@ -115,7 +112,6 @@ def draw_energies(run: Run) -> Figure:
     """Draw the work of loads and supports, the stored energy and the dissipated one."""
     narrow = page_width() < NARROW
     time, stored = _course(run, "t"), _course(run, "energy")
-    assert run.steps is not None
     work, taken = (np.cumsum(_course(run, name)) for name in ("work", "dissipation"))
     flows = "plastic_dissipation" in run.steps
     plastic = np.cumsum(_course(run, "plastic_dissipation")) if flows else 0 * taken

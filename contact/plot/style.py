@@ -168,22 +168,18 @@ def colour_bar(
     made.locator = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10])
 
 
-def uniform(low: float, high: float) -> bool:
-    """Tell whether a field with these ends is constant to rounding."""
-    return high - low <= 1e-6 * max(abs(low), abs(high))
-
-
 def widened(low: float, high: float) -> tuple[float, float]:
     """Return the ends of a colour bar: of a field that is constant to rounding a wide one."""
-    more = 0.05 * max(abs(low), abs(high)) or 1.0
-    return (low - more, high + more) if uniform(low, high) else (low, high)
+    largest = max(abs(low), abs(high))
+    more = 0.05 * largest or 1.0
+    return (low - more, high + more) if high - low <= 1e-6 * largest else (low, high)
 
 
 def colour_range(values: Array, label: str) -> tuple[Normalize, str]:
     """Return the range of colours without singular peaks, and a label with the peaks cut off."""
     low, high = (float(end) for end in np.quantile(values, OUTLIERS))
     ends, peaks = [float(values.min()), float(values.max())], []
-    if uniform(*ends):
+    if widened(*ends)[0] < ends[0]:
         return Normalize(*widened(*ends)), f"{label}, {ends[1]:.4g} everywhere"
     if low - ends[0] > 0.2 * (high - low) > 0:
         peaks.append(f"least {ends[0]:.3g}")
