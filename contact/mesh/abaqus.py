@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
@@ -339,15 +339,13 @@ def _contents(found: Deck) -> Contents:
     if np.unique(elements[:, 0]).size < len(elements):
         raise ValueError("*ELEMENT: a number is there twice; accepted: once")
     made, names = Contents(points, blocks), found.names_by_key()
-    for key in found.sets:
-        members = _members(found.sets, key)
-        made.groups[names[key]] = _by_block(members, elements)
+    for key, members in found.sets.items():
+        made.groups[names[key]] = _by_block(_numbers(found.sets, members), elements)
     for key, sets in found.nodes_of.items():
-        chosen = [number for name in sets for number in _members(found.sets, name)]
-        for block, within in _by_block(chosen, elements).items():
+        for block, within in _by_block(_numbers(found.sets, sets), elements).items():
             found.nodes[key] += map(int, tags[np.unique(blocks[block][1][within])])
-    for key in found.nodes:
-        numbers = _members(found.nodes, key)
+    for key, members in found.nodes.items():
+        numbers = _numbers(found.nodes, members)
         made.nodes[names[key]] = np.flatnonzero(np.isin(tags, numbers))
     dim = max((kind.dim for kind in made.kinds), default=0)
     for key, (sort, lines) in found.surfaces.items():
@@ -364,18 +362,16 @@ def _contents(found: Deck) -> Contents:
     return made
 
 
-def _members(sets: dict[str, list[Member]], key: str) -> list[int]:
-    """Return the numbers of a set, those of sets in it too."""
-    if key not in sets:
-        raise ValueError(f"there is no set {key}")
-    return _numbers(sets, sets[key])
-
-
-def _numbers(sets: dict[str, list[Member]], given: Sequence[Member]) -> list[int]:
-    """Return the numbers of members, each a number or a set."""
+def _numbers(sets: dict[str, list[Member]], given: Iterable[Member]) -> list[int]:
+    """Return the numbers of members, each a number or a set, which may have sets in it too."""
     numbers: list[int] = []
     for member in given:
-        numbers += [member] if isinstance(member, int) else _members(sets, member)
+        if isinstance(member, int):
+            numbers.append(member)
+        elif member in sets:
+            numbers += _numbers(sets, sets[member])
+        else:
+            raise ValueError(f"there is no set {member}")
     return numbers
 
 

@@ -83,7 +83,7 @@ def magnification(run: Run, box: Array | None = None) -> float:
     At most as much as leaves bodies without overlap. Visible displacements stay as they are.
     """
     diameter = run.diameter if box is None else float(np.ptp(box, axis=0).max())
-    largest = float(np.linalg.norm(run.displacement, axis=1).max())
+    largest = float(np.linalg.norm(run.body.point_data["displacement"], axis=1).max())
     if not 0 < largest < 0.02 * diameter:
         return 1.0
     wanted = 0.05 * diameter / largest

@@ -76,11 +76,6 @@ class Run:
         return np.asarray(self.surface.points[self.surface["row"] < 0, : len(self.axes)])
 
     @property
-    def displacement(self) -> Array:
-        """Displacement of the nodes of the body, shape (n, 3)."""
-        return np.asarray(self.body.point_data["displacement"])
-
-    @property
     def diameter(self) -> float:
         """Largest extent of the body."""
         return float(np.ptp(self.body.points, axis=0).max())

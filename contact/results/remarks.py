@@ -345,18 +345,15 @@ def resolution(solution: Solution) -> Iterator[Remark]:
     count = int(nodes.comm.allreduce(int(np.count_nonzero(closed)), op=MPI.SUM))
     if count == 0 or count == nodes.size:
         return
+    across, width = float(count), solution.contact_area
+    if problem.dim == 3 or problem.domain.revolved:  # of a round zone, not a ring
+        width = float(2 * np.sqrt(width / np.pi))
     if problem.dim == 3:
-        # Of a round zone with that many nodes.
         across = float(np.sqrt(4 * count / np.pi))
-        width = float(np.sqrt(4 * solution.contact_area / np.pi))
-    elif problem.domain.revolved:
-        # Both halves; the zone of one is known by its area, but for a ring.
+    elif problem.domain.revolved:  # both halves
         nearest_axis = float(nodes.points[closed, 0].min(initial=np.inf))
         on_axis = nodes.comm.allreduce(nearest_axis, op=MPI.MIN) < 1e-9 * problem.domain.size
-        across = 2 * count - 1 if on_axis else 2 * count
-        width = float(2 * np.sqrt(solution.contact_area / np.pi))
-    else:
-        across, width = count, solution.contact_area
+        across = 2 * count - on_axis
     if across < ACROSS:
         yield (
             f"the mesh is too coarse for the pressures: {counted(across, 'node')} across the "
