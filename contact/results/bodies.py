@@ -160,11 +160,9 @@ def overlapping(problem: ContactProblem) -> Iterator[Remark]:
 
 
 def unresisted_motions(solution: Solution) -> Iterator[Remark]:
-    """Warn of rigid-body modes that the supports leave free and contact hardly resists. Collective.
-
-    Contact is taken to resist with c = E/length times areas: along the normal where something
-    presses, along the surface where it sticks, and across the friction where it slips.
-    """
+    """Warn of rigid-body modes that are free, and that contact hardly resists. Collective."""
+    # Contact is taken to resist with c = E/length times areas: along the normal where something
+    # presses, along the surface where it sticks, and across the friction where it slips.
     problem, body = solution.problem, solution.problem.body
     if not solution.converged:
         return

@@ -318,10 +318,7 @@ class DerivedFields:
         return 1 + int(self.body.comm.allreduce(int(self.groups.max(initial=0)), op=MPI.MAX))
 
     def means(self) -> Array:
-        """Return means by volume in each group, (groups, local nodes, components), NaN for none.
-
-        Principal stresses are those of the averaged stress.
-        """
+        """Return means by volume in each group, (groups, local nodes, components), NaN for none."""
         space, volume, groups = self.body.space, volumes(self.body.domain), self.groups
         index_map, links = space.dofmap.index_map, space.dofmap.list
         nodes = index_map.size_local + index_map.num_ghosts
@@ -336,7 +333,7 @@ class DerivedFields:
             group[:] = accumulated(index_map, group)
         with np.errstate(invalid="ignore"):
             means = np.asarray(sums[..., :-1] / sums[..., -1:])
-        known = np.isfinite(means[..., 0])
+        known = np.isfinite(means[..., 0])  # principal stresses are those of the averaged stress
         stress, principal = self.columns["stress"], self.columns["principal_stress"]
         tensors = means[known, stress].reshape(-1, 3, 3)
         means[known, principal] = np.linalg.eigvalsh(tensors)[:, ::-1]

@@ -47,11 +47,9 @@ EXACT, MOST = 1e-10, 200
 
 
 def cubics(shape: Shape, at: Array) -> Array:
-    """Return the cubics without values at nodes, shape (q, n), at points of the reference cell.
-
-    Of simplices, one an edge, L_i L_j (L_i - L_j), and one a triangle, L_i L_j L_k, in barycentric
-    coordinates. Of others that of an interval along each axis, times quadratics along the others.
-    """
+    """Return the cubics without values at nodes, shape (q, n), at points of the reference cell."""
+    # Of simplices L_i L_j (L_i - L_j) of edges, L_i L_j L_k of triangles; of others that of an
+    # interval along each axis, times quadratics along the others.
     if shape.simplex:
         at = barycentric(at)
         size = range(at.shape[1])
@@ -96,11 +94,7 @@ HATS = Basis(lambda shape, at: shape.lagrange(1, at), lambda shape, at: shape.gr
 
 
 class LocalProblems:
-    """The local problems of a body of degree 2 at a state. Collective to make.
-
-    The flux is the stress in the basis of Mandel, with D where there is coupling, at the nodes of
-    the owned cells, shape (cells, nodes, 6 or 9).
-    """
+    """Local problems of degree 2, given fluxes at nodes, (cells, nodes, 6 or 9). Collective."""
 
     def __init__(self, problem: ContactProblem, state: State, flux: Array) -> None:
         body = self._body = problem.body
@@ -196,10 +190,7 @@ class LocalProblems:
         return through, held, unknown
 
     def squares(self, cells: Indices, moduli: Array) -> Array:
-        """Return the square of the energy norm of the errors in some of the owned cells.
-
-        `moduli`: from strains to fluxes, shape (cells, 6 or 9, 6 or 9), or one for all.
-        """
+        """Return squares of the energy norm of errors; moduli (cells, 6 or 9, 6 or 9), or one."""
         # Of a material without a field those of a field are zero.
         whole = np.zeros((len(cells), *2 * (9 if self._body.piezoelectric else 6,)))
         whole[:, : moduli.shape[1], : moduli.shape[2]] = moduli
@@ -309,10 +300,7 @@ def _loads(body: BodyEquilibrium, time: float) -> tuple[Array, Array]:
 
 
 class Sides:
-    """Sums over both sides of facets of values at some nodes of them. Collective to make.
-
-    `closures`: nodes of each facet as nodes of its cell, (facets, m).
-    """
+    """Sums over both sides of facets of values at nodes of cells, (facets, m). Collective."""
 
     def __init__(self, body: BodyEquilibrium, closures: NDArray[np.intp]) -> None:
         mesh, space, d = body.domain.mesh, body.space, body.dim
@@ -354,11 +342,11 @@ class Sides:
 
 
 def balancing(body: BodyEquilibrium, residual: Array, unknown: NDArray[np.bool_]) -> Array:
-    """Return the fluxes at the nodes of degree 2 of facets that balance cells. Collective.
+    """Return fluxes at nodes into cells, (cells, facets, nodes, b), that balance them. Collective.
 
     `residual`: of the linear functions of the owned cells, (cells, corners, b). `unknown`: whether
     the flux through facets of the boundary is unknown, and that through others is not the same on
-    both sides, (cells, facets, b). Fluxes into the cells, (cells, facets, nodes, b).
+    both sides, (cells, facets, b).
     """
     shape = shape_of(body.domain.mesh)
     corners, of = shape.facet_corners, geometry_nodes(body.domain)

@@ -260,11 +260,8 @@ Movements = dict[str, dict[str, Any]]
 
 
 def movements(problem: ContactProblem, state: State) -> Movements:
-    """Return the entries `rigid`, `rigid_parts`, `electrodes` and `bolts` of the summary.
-
-    Forces, moments and charges act from outside: those given, or the reactions of components that
-    are given. Collective.
-    """
+    """Return `rigid`, `rigid_parts`, `electrodes` and `bolts` of the summary. Collective."""
+    # Forces, moments and charges act from outside: those given, or reactions of given components.
     foundations, parts, electrodes, bolts = (dict[str, Any]() for _ in range(4))
     body = problem.body
     global_unknowns, q = body.global_unknowns, body.motion(state.x)
