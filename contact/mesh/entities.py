@@ -148,11 +148,10 @@ def connected_components(space: fem.FunctionSpace) -> tuple[Indices, int]:
 def distributed_components(
     space: fem.FunctionSpace, cells: Indices, keys: npt.NDArray[np.int64] | None = None
 ) -> tuple[Indices, int]:
-    """Return the connected component of each vertex of a distributed graph. Collective.
+    """Return the connected component of each local vertex of a graph, and their number. Collective.
 
-    The first vertices are the local nodes of a space, (nodes,), others have keys, (further, k), the
-    same on each rank that has them; the vertices of a local cell, (cells, n), are connected. The
-    result has the components of all local vertices, (nodes + further,), and their number.
+    Vertices are the nodes of a space, then those with keys, (further, k), the same on each rank
+    that has them; the vertices of a cell, (cells, n), are connected.
     """
     comm, index_map = lasting(space.mesh.comm), space.dofmap.index_map
     owned, nodes = index_map.size_local, index_map.size_local + index_map.num_ghosts

@@ -53,21 +53,13 @@ class GridError(InputError):
 
 @dataclass(frozen=True)
 class Piece:
-    """A side of a generated mesh, or the piece of it between two grid positions.
+    """A side of a generated mesh, or the piece of it between two grid positions."""
 
-    Attributes
-    ----------
-    side
-        Name of the side.
-    start, stop
-        Corners of the piece, in the coordinates before rotation that run along the side: one
-        number for a rectangle, two for a box, in the order of the axes (``top``: x, y). None
-        means the end of the side.
-    """
-
-    side: str
+    side: str  #: its name
+    #: Corners of the piece, in the coordinates before rotation that run along the side: one number
+    #: for a rectangle, two for a box, in the order of the axes (``top``: x, y); None for its end.
     start: float | Sequence[float] | None = None
-    stop: float | Sequence[float] | None = None
+    stop: float | Sequence[float] | None = None  #: likewise
 
 
 def rectangle(
