@@ -19,8 +19,9 @@ NEGLIGIBLE = 1e-9
 TOUCHING = 1e-6
 
 #: Overlap of two bodies, over the largest coordinate, that may be the rounding of positions in
-#: files: of both bodies, in single precision or with seven digits.
-POSITIONS = 2e-7
+#: files: of both bodies, in single precision. And the most of it, over the thickness of the thinner
+#: one: where positions are rounded more, far from the origin, they tell too little of a body.
+POSITIONS, POSITIONS_KNOWN = 2e-7, 1e-3
 
 #: The least tolerance of relative residuals: the size of their rounding errors.
 PRECISION = 1e-15

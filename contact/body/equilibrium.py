@@ -52,7 +52,7 @@ from contact.mesh.entities import (
 )
 from contact.mesh.geometry import areas, geometry_nodes, volumes
 from contact.ranks import summed
-from contact.tolerances import MOST_ROUNDING, POSITIONS, TOUCHING
+from contact.tolerances import MOST_ROUNDING, POSITIONS, POSITIONS_KNOWN, TOUCHING
 from contact.typing import Array
 
 
@@ -294,8 +294,16 @@ class BodyEquilibrium:
 
     def accepted_overlaps(self, one: NDArray[np.intp], other: NDArray[np.intp]) -> Array:
         """Return overlaps of components that count as none, shape (n,) (length). Collective."""
-        thinner = np.minimum(self.thicknesses[one], self.thicknesses[other])
-        return np.maximum(TOUCHING * thinner, self.position_rounding)
+        return self.rounded_overlap(np.minimum(self.thicknesses[one], self.thicknesses[other]))
+
+    def rounded_overlap(self, thickness: Array, by_hand: float = 1.0) -> Array:
+        """Return overlaps that count as none, by the thickness of the thinner body. Collective.
+
+        Positions that are written by hand are rounded so many times as those in files.
+        """
+        positions = by_hand * self.position_rounding
+        known = np.minimum(positions, POSITIONS_KNOWN * thickness)
+        return np.maximum(by_hand * TOUCHING * thickness, known)
 
     def components_of(self, *parts: str) -> NDArray[np.bool_]:
         """Return which connected components have facets of boundary parts, (k,). Collective."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.refining import coarser_cases
 from contact.results.bodies import apart, overlapping
-from contact.results.remarks import beyond_heights, own_shape
+from contact.results.remarks import beyond_heights, own_shape, rounded_overlaps
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 from forms.elasticity import Anisotropic
@@ -120,7 +121,7 @@ def expectations(problem: ContactProblem) -> list[str]:
     warnings = [
         f"# warning: {text} [{identifier}]"
         for identifier, remarks in {
-            "curved-surface": own_shape(problem),
+            "curved-surface": chain(rounded_overlaps(problem), own_shape(problem)),
             "part-end": beyond_heights(problem, np.ones(len(problem.nodes.weight), dtype=bool)),
             "supports": meeting_supports(problem, [problem.time]),
             "overlap": overlapping(problem),

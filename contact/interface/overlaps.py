@@ -233,7 +233,7 @@ class _Boundaries:
         if comm.allreduce(len(x)) == 0:
             return least, np.zeros((0, len(self.parts)), dtype=bool)
         widest = comm.allreduce(float(surface.radii.max(initial=0.0)), op=MPI.MAX)
-        radius = least + widest
+        radius = (least + widest) * (1 + NEGLIGIBLE)
         ball, rank = meeting(bounding_boxes(comm, centres), points, radius)
         near, ranks = within(centres, *exchanged(comm, rank, points[ball], radius[ball]))
         surface = self._curved(np.union1d(near, facet))

@@ -27,7 +27,7 @@ from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle
 from contact.model.obstacle.shapes import measured
-from contact.tolerances import ROUNDING, TOUCHING
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 #: Share of a facet that faces the master, if its nodes are not beyond the rim of that.
@@ -54,6 +54,11 @@ class PairPlacement:
     press: bool  #: whether overlaps in the reference configuration are interferences
     rounding: float  #: overlap that counts as rounding (length)
 
+    @property
+    def least_added(self) -> float:
+        """Least of the gaps that are added. Collective."""
+        return self.body.comm.allreduce(float(self.added.min(initial=np.inf)), op=MPI.MIN)
+
     def at(self, displacement: Array) -> Geometry:
         """Return the geometry at a displacement of the owned nodes, shape (nodes, d). Collective.
 
@@ -70,7 +75,8 @@ class PairPlacement:
         points = body.space.tabulate_dof_coordinates()[local, : body.dim]
         gap, cut = coupling.gap, 0.0
         if not self.press and coupling.depth <= self.rounding:
-            gap, cut = _without_sagittas(body.comm, coupling)
+            gap, cut = _touching(body.comm, coupling)
+            cut = max(cut - max(self.least_added, 0.0), 0.0)
         unknown = body.comm.allreduce(
             max(side.unknown_deviation for side in (slave, master)), op=MPI.MAX
         )
@@ -94,13 +100,17 @@ class PairPlacement:
         return Geometry(nodes, coupling, coupling.covered, cut=cut)
 
 
-def _without_sagittas(comm: MPI.Intracomm, coupling: Coupling) -> tuple[Array, float]:
+def _touching(comm: MPI.Intracomm, coupling: Coupling) -> tuple[Array, float]:
     """Return the gaps of sides that touch, and the largest depth that is left out. Collective."""
     # Chords of two curved sides that touch cut each other by their sagittas, which are no overlap:
     # g_j = max(g_j, min(w_j^-1 int Phi_j max(g, 0), 0)), below 0 where Phi_j alone is negative.
+    # An overlap by rounding goes where the sides are moved apart by its depth, which may be a tenth
+    # more at the tip of an edge than at the points where it is measured.
     least = np.minimum(coupling.gap_positive_part, 0.0)
     cut = comm.allreduce(float(np.max(least - coupling.gap, initial=0.0)), op=MPI.MAX)
-    return np.maximum(coupling.gap, least), cut
+    gap = np.maximum(coupling.gap, least)
+    gap = np.where(gap < 0, np.minimum(gap + 2 * coupling.depth, 0.0), gap)
+    return gap, max(cut, coupling.depth)
 
 
 def find_pair(
@@ -161,8 +171,8 @@ def find_pair(
             "pair",
         )
     _check_apart(body, coupling, slave.owners, label)
-    thinner = float(body.thicknesses[body.components_of(part, against)].min())
-    rounding = max(TOUCHING * thinner, body.position_rounding)
+    thinner = body.thicknesses[body.components_of(part, against)].min()
+    rounding = float(body.rounded_overlap(thinner))
     placement = PairPlacement(
         body, slave, master, reach, no_multiplier, coupling.nodes, added, press, rounding
     )
@@ -182,7 +192,7 @@ def _check_overlap(
     `alone`: partly covered facets without a neighbour that faces the master, shape (f,).
     """
     body, rounding, owners = pair.body, pair.rounding, pair.slave.owners
-    least = body.comm.allreduce(float(pair.added.min(initial=np.inf)), op=MPI.MIN)
+    least = pair.least_added
     depth, resolved = coupling.interference(owners, pair.added)
     inside, beside = overlap
     depth = max(depth, max(overlap) - max(least, 0.0))

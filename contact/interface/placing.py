@@ -27,7 +27,6 @@ from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle, Shape
 from contact.model.obstacle.shapes import measured
 from contact.ranks import on_all_ranks
-from contact.tolerances import TOUCHING
 from contact.typing import Array
 
 #: Depth in a shape that counts as rounding, over that in a body: numbers of shapes are written by
@@ -136,8 +135,8 @@ def find_candidates(
 
 def _rounding(body: BodyEquilibrium, part: str) -> float:
     """Return the depth of a part in a shape that counts as rounding (length). Collective."""
-    thinnest = float(body.thicknesses[body.components_of(part)].min())
-    return BY_HAND * max(TOUCHING * thinnest, body.position_rounding)
+    thinnest = body.thicknesses[body.components_of(part)].min()
+    return float(body.rounded_overlap(thinnest, BY_HAND))
 
 
 def _from_curve(

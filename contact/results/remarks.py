@@ -21,11 +21,13 @@ from contact.interface.mortar.search import nearest
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import ALIKE_NORMALS
-from contact.mesh.entities import exterior_facets
+from contact.mesh.entities import cells_at, exterior_facets
+from contact.mesh.geometry import areas, volumes
 from contact.model.obstacle import Heights, Shape
 from contact.problem.checks import meeting_supports
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_as_pressures, residual_forces
+from contact.problem.state import State
 from contact.results import bodies
 from contact.results.error_estimate import estimated
 from contact.results.fields import DerivedFields, deformation, unloaded
@@ -63,7 +65,7 @@ COARSE = 0.15
 #: the pressure by it, as a share of the largest.
 DEVIATION = 0.1
 
-#: Strain of a facet by an overlap that is taken as 0, over the largest strain, that is warned of.
+#: Strain by an overlap that is taken as 0, over the largest there, that is warned of.
 DROPPED = 0.01
 
 #: Largest turn h/R of a straight edge of degree 2 without a warning.
@@ -459,7 +461,7 @@ def beyond_heights(problem: ContactProblem, touched: NDArray[np.bool_]) -> Itera
 def coarse_curves(solution: Solution) -> Iterator[Remark]:
     """Warn of straight facets of a curved surface whose deviation decides gaps or pressures."""
     problem, nodes = solution.problem, solution.problem.nodes
-    yield from _dropped_overlaps(solution)
+    yield from rounded_overlaps(problem, solution.state)
     closed, uncertainty = solution.status != "open", nodes.maximum(nodes.deviation)
     if nodes.maximum(closed.astype(float)) == 0:
         least = -nodes.maximum(-problem.interface.gap, -np.inf)
@@ -483,21 +485,32 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
                 )
 
 
-def _dropped_overlaps(solution: Solution) -> Iterator[Remark]:
-    """Warn of overlaps that are taken as 0, but would strain facets notably. Collective."""
-    problem, made = solution.problem, solution.deformation
-    least = max(TOUCHING, DROPPED * made.largest_strain if made is not None else 0.0)
+def rounded_overlaps(problem: ContactProblem, state: State | None = None) -> Iterator[Remark]:
+    """Warn of overlaps that are taken as 0, but would strain cells at the contact. Collective.
+
+    That is compared with the largest strain of these cells at the state.
+    """
+    body, domain, comm = problem.body, problem.domain, problem.comm
+    factor = 1 if not shape_of(domain.mesh).simplex else domain.dim
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
         if geometry.cut == 0:
             continue
-        body, parts = problem.body, [part for part in (contact.on, contact.against) if part]
-        sides = [surface_of(problem.domain, body.space, part) for part in parts]
-        edge = min(float(side.edges.min(initial=np.inf)) for side in sides)
-        thinner = float(body.thicknesses[body.components_of(*parts)].min())
-        if geometry.cut > least * min(problem.comm.allreduce(edge, op=MPI.MIN), thinner):
+        parts = [part for part in (contact.on, contact.against) if part]
+        facets = np.unique(np.concatenate([domain.facets(part) for part in parts]))
+        cells = cells_at(domain.mesh, facets)[0]
+        heights = factor * volumes(domain)[cells] / areas(domain, facets)
+        sides = [surface_of(domain, body.space, part).edges.ravel() for part in parts]
+        least = min(x.min(initial=np.inf) for x in (heights, *sides))
+        strain, allowed = geometry.cut / comm.allreduce(float(least), op=MPI.MIN), TOUCHING
+        if strain > TOUCHING and state is not None:
+            fields = DerivedFields(body, state)
+            eps = np.linalg.norm(fields.cell_means()[cells, fields.columns["strain"]], axis=1)
+            largest = comm.allreduce(float(eps.max(initial=0.0)), op=MPI.MAX)
+            allowed = max(TOUCHING, DROPPED * largest)
+        if strain > allowed:
             yield (
                 f"contact surfaces overlap by up to {geometry.cut:.3g} at {contact.on}, as facets "
-                "of curves or rounded positions do: the gap there is taken as 0; accepted: of "
+                "of curves or rounded positions do, and are taken to touch there; accepted: of "
                 f'curves {FINER}, of an interference overlap = "press"'
             )
 

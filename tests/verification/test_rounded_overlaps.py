@@ -1,11 +1,15 @@
 """What counts as rounding of overlaps: by the thinner body, and by the digits of files."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact import Body, Contact, Fixed, Linear, Plane, Problem, Sphere, solve
+from contact.cli.check import expectations
 from contact.errors import InputError
+from contact.results.remarks import rounded_overlaps
 from tests.problems.overlapping import (
     ELEMENTS,
     PLANE,
@@ -68,17 +72,17 @@ def test_depths_that_rounded_positions_may_have_are_said():
 
 @pytest.mark.parallel
 @pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("loaded", [False, True])
+@pytest.mark.parametrize(("loaded", "width"), [(False, 1e-3), (True, 1e-3), (True, 1.0)])
 @pytest.mark.parametrize("cell", [*PLANE, "hexahedron"])
-def test_depths_that_strain_thin_tips_of_thick_bodies_are_said(cell, loaded, degree):
-    """The thickness of a body is a mean: what is nothing to its bulk may strain a tip of it."""
+def test_depths_that_strain_thin_tips_of_thick_bodies_are_said(cell, loaded, width, degree):
+    """What is nothing to the bulk of a body may strain a tip of it, or one layer of its cells."""
     tip, heads = 1e-3, ["inner0", "outer1"]
     for depth, said in ((3e-7, True), (1e-12, False)):
         domain = layers(COMM, cell, 1, "flat", 0.0, counts=(4, 4))
         d, x = domain.dim, domain.mesh.geometry.x
         second = of_layer(domain, 1)
         along = 2 * np.abs(x[:, 0] - RADII[1])
-        x[:, 1:d] *= np.where(along < 0.3, tip, 1.0)[:, None]
+        x[:, 1:d] *= np.where(along < 0.3, width, 1.0)[:, None]
         place = np.interp(along, [0, 0.25, 1.0], [0.0, tip, 1.0])
         x[:, 0] = 1 + np.where(second, place - depth, -place)
         given = [Fixed(name, [0.0] * d) for name in heads]
@@ -122,3 +126,80 @@ def test_depths_of_small_bodies_in_shapes(degree):
         foundation = Plane((end, 0.0), (1.0, 0.0)) if shape is Plane else Sphere((0, 0), end)
         with pytest.raises(InputError, match=r"\[overlap\]"):
             Problem(domain, given, Contact("inner1", foundation), degree=degree)
+
+
+def distant(shift, depth):
+    """Return two blocks side by side, `depth` in each other and moved by `shift`, and a body."""
+    domain = layers(COMM, "quadrilateral", 1, "flat", depth)
+    domain.mesh.geometry.x[:, :2] += shift
+    return domain, Body(Linear(YOUNG, POISSON), [Fixed("inner0", [0, 0]), Fixed("outer1", [0, 0])])
+
+
+@pytest.mark.parallel
+def test_strain_elsewhere_hides_no_overlap():
+    """Cells at the contact are unstrained, those at the other end are not."""
+    domain, given = distant(0.0, 3e-7)
+    problem = Problem(domain, given, Contact(**BETWEEN))
+    start, said = problem.start(), []
+    for end in (RADII[2] - 0.01, 0.0):
+        x = start.x.copy()
+        u = problem.body.nodal(x)
+        place = problem.body.space.tabulate_dof_coordinates()[: len(u), 0]
+        u[place > end, 0] = 0.1 * place[place > end]
+        said.append(len([*rounded_overlaps(problem, replace(start, x=x))]))
+    assert said == [1, 0]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("gap", [0.0, 1e-3])
+def test_the_overlap_is_that_of_the_bodies_and_their_gap(gap):
+    """A positive gap makes up for it; `contact check` warns as a solution does."""
+    domain, given = distant(0.0, 3e-7)
+    problem = Problem(domain, given, Contact(**BETWEEN, gap=gap))
+    assert problem.geometries[0].cut == pytest.approx(0.0 if gap else 3e-7, rel=1e-6)
+    said = [line for line in expectations(problem) if "overlap by up to 3e-07" in line]
+    assert len(said) == (gap == 0)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(("shift", "depth"), [(1e3, 1.9e-3), (5e5, 0.09)])
+def test_overlaps_far_from_the_origin(shift, depth):
+    """Where positions may be rounded by more than a thousandth of a body, overlaps are refused."""
+    domain, given = distant(shift, depth)
+    assert told(domain, given, Contact(**BETWEEN)) == pytest.approx(depth, rel=1e-6)
+    wall = Plane((RADII[1] - depth + shift, shift), (-1.0, 0.0))
+    with pytest.raises(InputError, match=r"\[overlap\]"):
+        Problem(domain, given, Contact("outer0", wall))
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("cell", [*PLANE, "hexahedron"])
+@pytest.mark.parametrize("form", ["edge", "round"])
+def test_edges_and_round_bodies_that_overlap_by_rounding_touch(form, cell, degree):
+    """Their gaps are those of bodies that touch: no force, and the depth is told."""
+    depth, gaps = 3e-7, []
+    for on, against in (("outer0", "inner1"), ("inner1", "outer0")):
+        for drawn in (0.0, depth):
+            domain = layers(COMM, cell, 1, "flat", drawn, counts=(4, 4))
+            x, second = domain.mesh.geometry.x, of_layer(domain, 1)
+            apart = np.abs(x[:, 1] - 0.5)
+            x[:, 0] += second * (0.2 * apart if form == "edge" else 0.5 * apart**2)
+            given = Body(Linear(YOUNG, POISSON), [])
+            problem = Problem(domain, given, Contact(on, against=against), degree=degree)
+            gaps.append(problem.nodes.gap)
+            assert problem.geometries[0].cut == pytest.approx(drawn, rel=0.1, abs=1e-12)
+        touching, found = gaps[-2:]
+        assert np.all(found >= np.minimum(touching, 0.0) - 1e-12)
+
+
+def test_squares_whose_corners_and_middles_are_in_line_touch():
+    """The nearest facet of a point is found although its centre and nodes are on one line."""
+    rng = np.random.default_rng
+    for seed in range(20):
+        domain = layers(COMM, "quadrilateral", 1, "flat", 0.0, (0.0, 1.0, 2.0), (2, 2))
+        turn = np.linalg.qr(rng(seed).standard_normal((2, 2)))[0]
+        x = domain.mesh.geometry.x
+        x[:, :2] = x[:, :2] @ turn * np.linalg.det(turn) + 10
+        given = Body(Linear(YOUNG, POISSON), [])
+        assert Problem(domain, given, Contact(**BETWEEN)).geometries[0].cut < 1e-12
