@@ -88,6 +88,7 @@ def laws(report: Report) -> None:
         axes.axvline(0.0, color="0.7", lw=0.6)
         axes.plot(u, force, "k", lw=1.6)
         part = r"\tau" if number == "1-7" else r"\nu"
+        axes.locator_params(axis="x", nbins=5)
         axes.set(xlabel=rf"$u_{part}$ (arb. units)", ylabel=rf"$-\sigma_{part}$ (arb. units)")
         caption = f"Figure {number.replace('-', '.')}: {topic}"
         note = (
