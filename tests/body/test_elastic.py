@@ -217,7 +217,7 @@ WRONG = {
         [{"on": "bottom", "normal": "100*(x-1)"}],
         r"elastic\.0\.normal.*\[negative-stiffness\]",
     ),
-    "three": ([{"on": "bottom", "stiffness": [1.0] * 3}], r"\[value\]"),
+    "three": ([{"on": "bottom", "stiffness": [1.0] * 3}], r"\[elastic\]"),
     "in time": (
         [{"on": "bottom", "normal": "t"}],
         r"elastic\.0\.normal: \"t\" depends on the time.*\[formula-variable\]",
