@@ -16,6 +16,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.elements import unlocked
+from contact.body.materials import young_behind
 from contact.errors import counted
 from contact.interface.mortar.search import nearest
 from contact.interface.mortar.surface import surface_of
@@ -65,8 +66,9 @@ COARSE = 0.15
 #: the pressure by it, as a share of the largest.
 DEVIATION = 0.1
 
-#: Strain by an overlap that is taken as 0, over the largest there, that is warned of.
-DROPPED = 0.01
+#: Strain, or pressure, by an overlap that is taken as 0, over the largest one there, that is warned
+#: of; and strain where no solution is known.
+DROPPED, STRAINED = 0.01, 1e-4
 
 #: Largest turn h/R of a straight edge of degree 2 without a warning.
 TURN = 0.05
@@ -488,12 +490,14 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
 def rounded_overlaps(problem: ContactProblem, state: State | None = None) -> Iterator[Remark]:
     """Warn of overlaps that are taken as 0, but would strain cells at the contact. Collective.
 
-    That is compared with the largest strain of these cells at the state.
+    Their strain, and the pressure by that and the modulus at the contact, are compared with the
+    largest ones there, where a state is known.
     """
     body, domain, comm = problem.body, problem.domain, problem.comm
     factor = 1 if not shape_of(domain.mesh).simplex else domain.dim
-    for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
-        if geometry.cut == 0:
+    for number, contact in enumerate(problem.contacts):
+        cut = problem.geometries[number].cut
+        if cut <= TOUCHING * NEGLIGIBLE * domain.size:
             continue
         parts = [part for part in (contact.on, contact.against) if part]
         facets = np.unique(np.concatenate([domain.facets(part) for part in parts]))
@@ -501,17 +505,22 @@ def rounded_overlaps(problem: ContactProblem, state: State | None = None) -> Ite
         heights = factor * volumes(domain)[cells] / areas(domain, facets)
         sides = [surface_of(domain, body.space, part).edges.ravel() for part in parts]
         least = min(x.min(initial=np.inf) for x in (heights, *sides))
-        strain, allowed = geometry.cut / comm.allreduce(float(least), op=MPI.MIN), TOUCHING
-        if strain > TOUCHING and state is not None:
+        strain = cut / comm.allreduce(float(least), op=MPI.MIN)
+        told = strain > (STRAINED if state is None else TOUCHING)
+        if told and state is not None:
+            materials = problem.description.materials
+            young = min(young_behind(domain, materials, body.cells, part) for part in parts)
+            own = np.where(problem.entry_numbers == number, state.forces.contact, 0.0)
             fields = DerivedFields(body, state)
             eps = np.linalg.norm(fields.cell_means()[cells, fields.columns["strain"]], axis=1)
-            largest = comm.allreduce(float(eps.max(initial=0.0)), op=MPI.MAX)
-            allowed = max(TOUCHING, DROPPED * largest)
-        if strain > allowed:
+            strained = comm.allreduce(float(eps.max(initial=0.0)), op=MPI.MAX)
+            pressed = problem.nodes.maximum(own) / young
+            told = strain > DROPPED * min(strained, pressed)
+        if told:
             yield (
-                f"contact surfaces overlap by up to {geometry.cut:.3g} at {contact.on}, as facets "
-                "of curves or rounded positions do, and are taken to touch there; accepted: of "
-                f'curves {FINER}, of an interference overlap = "press"'
+                f"contact surfaces overlap by up to {cut:.3g} at {contact.on}, as facets of curves "
+                "or rounded positions do, and are taken to touch there; accepted: of curves "
+                f'{FINER}, of an interference overlap = "press"'
             )
 
 
