@@ -58,7 +58,7 @@ COARSEST = 4
 SMALL = 500
 
 #: Solves a problem from an initial guess, `start`; the solution is not reviewed.
-Solver = Callable[..., Solution]
+Solve = Callable[..., Solution]
 
 #: Cells whose indicator is within that of the last one marked are marked too: rounding, which
 #: differs by the number of ranks, decides nothing.
@@ -215,7 +215,7 @@ def _coarser(mesh: Mesh | None) -> Mesh | None:
     return coarser
 
 
-def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
+def adapted(case: Case, comm: MPI.Intracomm, solve: Solve) -> Solution:
     """Solve a case on finer and finer meshes, until its `[mesh.adapt]` is met. Collective.
 
     Of an evolution all steps are solved on each mesh, and the largest indicator of each cell
@@ -254,7 +254,7 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
     return solution
 
 
-def _solved_after(before: Solution | None, problem: ContactProblem, solve: Solver) -> Solution:
+def _solved_after(before: Solution | None, problem: ContactProblem, solve: Solve) -> Solution:
     """Solve on the next mesh, from the solution on the mesh before, and estimate. Collective."""
     start = None
     if before is not None and not before.steps:

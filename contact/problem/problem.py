@@ -267,16 +267,16 @@ class ContactProblem:
         return find_nodes(body, contact.on, *arguments, conducts)
 
     @cached_property
-    def contact_young(self) -> float:
-        """Largest modulus at a contact (stress); of a pair that of the softer side. Collective.
+    def contact_youngs(self) -> list[float]:
+        """Modulus at each contact (stress); of a pair that of the softer side. Collective.
 
         Parts away from the contacts may be much softer.
         """
         where = self.domain, self.description.materials, self.body.cells
-        return max(min(young_behind(*where, part) for part in both) for both in self._sides)
+        return [min(young_behind(*where, part) for part in both) for both in self.sides]
 
     @property
-    def _sides(self) -> list[list[str]]:
+    def sides(self) -> list[list[str]]:
         """The parts of each contact."""
         return [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
 
@@ -284,15 +284,15 @@ class ContactProblem:
         """Return the laws of all contacts at their geometries. Collective."""
         body, geometries = self.body, self.geometries
         nodes = joined_nodes(geometries, [contact.on for contact in self.contacts], body)
-        stiffness, extents = self.contact_young / self.domain.size, body.extents
-        sizes = np.array([extents[body.components_of(*both)].min() for both in self._sides])
+        young, extents = max(self.contact_youngs), body.extents
+        sizes = np.array([extents[body.components_of(*both)].min() for both in self.sides])
         conductors = [contact.conductor for contact in self.contacts]
         law = FoundationLaw(
             nodes=nodes,
             layer=joined_layers([contact.compliant_layer for contact in self.contacts], geometries),
             conductor=joined_conductors(conductors, [geometry.nodes for geometry in geometries]),
             phi_scale=body.phi_scale,
-            c_0=stiffness,
+            c_0=young / self.domain.size,
         )
         frictions = [contact.friction or Friction() for contact in self.contacts]
         facets = [self.domain.facets(contact.on) for contact in self.contacts]
@@ -304,8 +304,8 @@ class ContactProblem:
             fixed_conducting=joined_fixed_conducting(
                 conductors, geometries, law, body.layout.index_map.local_range[0]
             ),
-            c_0=stiffness,
-            stiffness=self.contact_young / sizes[self.entry_numbers],
+            c_0=young / self.domain.size,
+            stiffness=young / sizes[self.entry_numbers],
             size=self.domain.size,
             elongation=max(elongation(self.domain.mesh, part) for part in facets),
             component=body.component_norms.component[nodes.nodes],
@@ -338,7 +338,7 @@ class ContactProblem:
         mesh_area = self._area(replace(domain, revolved=False)) if domain.revolved else contact_area
         return Scales(
             **self.body.softest._asdict(),
-            contact_young=self.contact_young,
+            contact_young=max(self.contact_youngs),
             size=domain.size,
             height=volume(domain) / contact_area,
             area=contact_area,

@@ -16,7 +16,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.elements import unlocked
-from contact.body.materials import young_behind
 from contact.errors import counted
 from contact.interface.mortar.search import nearest
 from contact.interface.mortar.surface import surface_of
@@ -495,11 +494,10 @@ def rounded_overlaps(problem: ContactProblem, state: State | None = None) -> Ite
     """
     body, domain, comm = problem.body, problem.domain, problem.comm
     factor = 1 if not shape_of(domain.mesh).simplex else domain.dim
-    for number, contact in enumerate(problem.contacts):
+    for number, parts in enumerate(problem.sides):
         cut = problem.geometries[number].cut
-        if cut <= TOUCHING * NEGLIGIBLE * domain.size:
+        if cut <= EPS * domain.size:
             continue
-        parts = [part for part in (contact.on, contact.against) if part]
         facets = np.unique(np.concatenate([domain.facets(part) for part in parts]))
         cells = cells_at(domain.mesh, facets)[0]
         heights = factor * volumes(domain)[cells] / areas(domain, facets)
@@ -508,17 +506,15 @@ def rounded_overlaps(problem: ContactProblem, state: State | None = None) -> Ite
         strain = cut / comm.allreduce(float(least), op=MPI.MIN)
         told = strain > (STRAINED if state is None else TOUCHING)
         if told and state is not None:
-            materials = problem.description.materials
-            young = min(young_behind(domain, materials, body.cells, part) for part in parts)
             own = np.where(problem.entry_numbers == number, state.forces.contact, 0.0)
             fields = DerivedFields(body, state)
             eps = np.linalg.norm(fields.cell_means()[cells, fields.columns["strain"]], axis=1)
             strained = comm.allreduce(float(eps.max(initial=0.0)), op=MPI.MAX)
-            pressed = problem.nodes.maximum(own) / young
+            pressed = problem.nodes.maximum(own) / problem.contact_youngs[number]
             told = strain > DROPPED * min(strained, pressed)
         if told:
             yield (
-                f"contact surfaces overlap by up to {cut:.3g} at {contact.on}, as facets of curves "
+                f"contact surfaces overlap by up to {cut:.3g} at {parts[0]}, as facets of curves "
                 "or rounded positions do, and are taken to touch there; accepted: of curves "
                 f'{FINER}, of an interference overlap = "press"'
             )
