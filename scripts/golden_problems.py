@@ -31,7 +31,7 @@ from contact import (
 )
 from scripts.cases import CASES, bar, on_grid
 from scripts.gallery import EXAMPLES, Run
-from scripts.golden import Value, counted, measured
+from scripts.golden_values import Value, counted, measured
 from scripts.thesis import table_7_1, table_7_2, tables_compliance, tables_piezo
 from tests.problems import (
     apart,

@@ -12,8 +12,9 @@ from contact.errors import InputError
 from scripts import golden
 from scripts.cases import CASES
 from scripts.gallery import EXAMPLES
-from scripts.golden import Value, compare, digest, on_other_meshes
+from scripts.golden import compare, on_other_meshes
 from scripts.golden_problems import COARSE, PROBLEMS
+from scripts.golden_values import Value, digest
 from scripts.studies.mutants import MUTANTS, ROOT, Mutant
 
 STORED = {
