@@ -14,7 +14,7 @@ from mpi4py import MPI
 from contact import build_problem
 from contact.body import elements
 from contact.problem.problem import ContactProblem
-from contact.problem.rigid_modes import constrained_by_supports
+from contact.problem.rigid_modes import unsupported
 from contact.results.error_estimate import estimated
 from scripts.benchmarks.bench_one import block
 
@@ -74,4 +74,4 @@ def test_review_and_rigid_modes_need_less_than_the_matrix(monkeypatch: pytest.Mo
     """That takes some 520 bytes an unknown, and is no more, or not all yet, then."""
     monkeypatch.setattr(elements, "CHUNK", 500)
     assert growth(lambda problem: estimated(problem, problem.start())) < 450
-    assert growth(constrained_by_supports) < 200
+    assert growth(unsupported) < 200

@@ -45,7 +45,7 @@ class LoadStepping:
         self._last, self._before = start, before
         self._unilateral = unilateral_supports(problem)
         # Supports are the same in all steps.
-        self._modes = UnconstrainedModes(problem)
+        self._modes = UnconstrainedModes.of(problem)
 
     def steps(self, times: Sequence[float], begin: float = 0.0) -> Iterator[tuple[State, Outcome]]:
         """Yield state and outcome of each step; a step that fails is the last one. Collective.
@@ -88,8 +88,8 @@ class LoadStepping:
         self.method.set_load_step(problem)
         ends = [(problem, state) for state in (before, last) if state is not None]
         start = predicted(problem, ends) if ends else None
-        self._modes.problem = problem
-        return solve_step(problem, self.method, start, self._modes)
+        modes = replace(self._modes, problem=problem)
+        return solve_step(problem, self.method, start, modes)
 
 
 #: Largest ratio of the predicted increment of the solution to that of the last step.

@@ -32,6 +32,10 @@ class Method(Protocol):
     """
 
     @property
+    def problem(self) -> ContactProblem:
+        """The problem, at its last load step."""
+
+    @property
     def options(self) -> Any:
         """Its options; `allowed` is the tolerance of each residual."""
 
@@ -88,7 +92,7 @@ def solve_step(
         counters=method.counters - counted,
     )
     end = evaluated(problem, state, outcome)
-    return with_least_displacements(modes or UnconstrainedModes(problem), *end)
+    return with_least_displacements(modes or UnconstrainedModes.of(problem), *end)
 
 
 def evaluated(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:

@@ -207,7 +207,7 @@ class Newton:
         """Choose the complementarity parameters, and whether the body is to be condensed."""
         problem, options = self.problem, self.options
         parameters = problem.scales.complementarity_parameters(options.gamma)
-        self._modes = UnconstrainedModes(problem)
+        self._modes = UnconstrainedModes.of(problem)
         underconstrained = not self._modes.constrained_undeformed
         self._step = NewtonStep(problem, options, parameters, self.counters, underconstrained)
         self._condenses = options.condense and condensable(problem, options.linear)
@@ -218,7 +218,7 @@ class Newton:
 
     def set_load_step(self, problem: ContactProblem) -> None:
         """Take another load step of the same problem; factorisations remain."""
-        self.problem = self._modes.problem = problem
+        self.problem, self._modes = problem, replace(self._modes, problem=problem)
         self.recorder = Recorder(self.monitor)
         if self.condensed_steps.condensation is not None:
             self.condensed_steps.condensation.set_load_step(problem)

@@ -30,11 +30,10 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.rigid_modes import (
     Group,
-    constrained_by_supports,
-    groups,
     missing_pressure,
     null_space,
     sliding_mode,
+    unsupported,
 )
 from contact.problem.state import State
 from contact.ranks import summed
@@ -62,16 +61,23 @@ class RigidMotion:
         return self.motions @ self.amounts
 
 
-@dataclass
+@dataclass(frozen=True)
 class UnconstrainedModes:
-    """Constraints of the rigid-body modes of the whole problem. Collective."""
+    """Constraints of the rigid-body modes of the whole problem at a load step. Collective."""
 
     problem: ContactProblem
+    #: Groups of bodies with modes that their supports do not constrain, the same in all load steps.
+    groups: tuple[Group, ...]
 
-    @cached_property
+    @staticmethod
+    def of(problem: ContactProblem) -> UnconstrainedModes:
+        """Return the modes of a problem. Collective."""
+        return UnconstrainedModes(problem, unsupported(problem))
+
+    @property
     def constrained_by_supports(self) -> bool:
         """Whether the supports constrain all modes without contact."""
-        return constrained_by_supports(self.problem)
+        return not self.groups
 
     @cached_property
     def constrained_undeformed(self) -> bool:
@@ -87,7 +93,7 @@ class UnconstrainedModes:
         """Tell whether supports and contact of the reference configuration constrain all modes."""
         interface, rest = self.problem.interface, self.problem.start()
         touching = interface.normal_gap(interface.nodes.jump(rest.x)) <= 1e-12 * interface.size
-        grams = [group.constraints(friction, touching) for group in groups(self.problem)]
+        grams = [group.constraints(friction, touching) for group in self.groups]
         return all(null_space(gram).size == 0 for gram in grams)
 
     def overloaded(self, bound: Array, pressure: Array | None = None) -> bool:
@@ -96,22 +102,16 @@ class UnconstrainedModes:
         Of pressures that miss a share of the loads, which may be larger by it, and so friction;
         those that bear less than half of the loads prove nothing.
         """
-        weight, time, missing = self.problem.nodes.weight, self.problem.time, 0.0
+        weight, missing = self.problem.nodes.weight, 0.0
+        loads = self.problem.body.external(self.problem.time)
         if pressure is not None:
-            shares = [
-                missing_pressure(group, time, weight * pressure) for group in self._unsupported
-            ]
+            shares = [missing_pressure(group, loads, weight * pressure) for group in self.groups]
             missing = max(shares, default=0.0)
         if not missing <= 1:
             return False
         friction = (1 + missing) * weight * bound
-        sliding = [sliding_mode(group, time, friction) for group in self._unsupported]
+        sliding = [sliding_mode(group, loads, friction) for group in self.groups]
         return any(mode is not None for mode in sliding)
-
-    @cached_property
-    def _unsupported(self) -> list[Group]:
-        """Groups of bodies with modes that their supports do not constrain."""
-        return [group for group in groups(self.problem) if null_space(group.supports).size > 0]
 
     def separated(self, problem: CondensedProblem, step: NewtonStep) -> State | None:
         """Return a state with all nodes open after a rigid motion; None without one. Collective.
@@ -149,7 +149,7 @@ class UnconstrainedModes:
         # Pressures that are rounding do not constrain.
         pressed = interface.pressure(jump, state.forces) > interface.rounding_pressure(jump)
         motions, columns = [], []
-        for group in self._unsupported:
+        for group in self.groups:
             free = null_space(group.constraints(self.problem.frictional, pressed))
             if free.shape[1] > 0:
                 along = group.normal[:, None, :] * nodes.admissible_normal[:, :, None]

@@ -138,9 +138,9 @@ def groups(problem: ContactProblem) -> Iterator[Group]:
         )
 
 
-def constrained_by_supports(problem: ContactProblem) -> bool:
-    """Tell whether the supports constrain all rigid-body modes. Collective."""
-    return all([null_space(group.supports).size == 0 for group in groups(problem)])
+def unsupported(problem: ContactProblem) -> tuple[Group, ...]:
+    """Return the groups with modes that the supports do not constrain. Collective."""
+    return tuple(group for group in groups(problem) if null_space(group.supports).size > 0)
 
 
 def _free_motions(problem: ContactProblem) -> dict[int, tuple[str, int]]:
@@ -389,7 +389,7 @@ class UnilateralSupport:
 
     def release(self, time: float) -> Release | None:
         """Return the mode by which loads move the bodies off; None if balanced. Collective."""
-        work, scale = _work(self.group, self.free, time)
+        work, scale = _work(self.group, self.free, self.group.problem.body.external(time))
         return on_root(self.group.problem.comm, lambda: self._release(work, scale))
 
     def _release(self, work: Array, scale: float) -> Release | None:
@@ -456,8 +456,8 @@ def release_message(supports: Sequence[UnilateralSupport], begin: float, end: fl
     return f"from t = {end:g} on the loads {PUSHED_THROUGH if earliest.saturated else PULLED_OFF}"
 
 
-def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
-    """Return the mode, shape (m,), by which the loads of a time slide a group; None if balanced.
+def sliding_mode(group: Group, loads: Array, friction: Array) -> Array | None:
+    """Return the mode, shape (m,), by which owned loads slide a group; None if balanced.
 
     By bounds of the friction forces at the nodes of this rank, shape (n,) (force). Collective.
     """
@@ -469,7 +469,7 @@ def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
         nodes.gather(of[near]) for of in (group.normal @ free, group.tangential @ free, friction)
     )
     sideways = [nodes.gather(along[near]) for along in _sideways(nodes.normal)]
-    work, scale = _work(group, free, time)
+    work, scale = _work(group, free, loads)
     if np.abs(work).max() <= NEGLIGIBLE * scale:
         return None
 
@@ -484,13 +484,13 @@ def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
     return on_root(problem.comm, largest_mode)
 
 
-def missing_pressure(group: Group, time: float, pressing: Array) -> float:
-    """Return the relative imbalance of loads and contact forces on rigid motions without slip.
+def missing_pressure(group: Group, loads: Array, pressing: Array) -> float:
+    """Return the relative imbalance of owned loads and contact forces on motions without slip.
 
     `pressing`: normal contact forces at the nodes of this rank, shape (n,) (force). Collective.
     """
     problem, free = group.problem, null_space(group.supports)
-    work, scale = _work(group, free, time)
+    work, scale = _work(group, free, loads)
     slipless = free @ null_space(
         _gram(problem, group.tangential[np.isfinite(problem.nodes.gap)] @ free)
     )
@@ -539,10 +539,9 @@ def _most_power(
     return mode
 
 
-def _work(group: Group, free: Array, time: float) -> tuple[Array, float]:
-    """Return the power of the loads on free modes, (k,), and the sum of |loads|. Collective."""
+def _work(group: Group, free: Array, loads: Array) -> tuple[Array, float]:
+    """Return the power of owned loads on free modes, (k,), and the sum of |loads|. Collective."""
     body, comm, moved = group.problem.body, group.problem.comm, group.moved
-    loads = body.external(time)
     on_global = loads[body.owned :]
     group_loads = np.where(group.inside[:, None], body.nodal(loads), 0.0).ravel()
     work = comm.allreduce(moved[: body.owned].T @ group_loads, op=MPI.SUM)

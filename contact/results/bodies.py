@@ -226,7 +226,7 @@ def not_held(solution: Solution) -> Iterator[Remark]:
         if solution.outcome.overloaded:
             by = "the friction of the pressures that were found"
             bound = problem.nodes.weight * solution.friction_bound
-            motion = sliding_mode(group, time, bound)
+            motion = sliding_mode(group, problem.body.external(time), bound)
         elif (support := UnilateralSupport.of(group)) is not None:
             found = support.release(time)
             motion = None if found is None else found.motion

@@ -197,7 +197,7 @@ def sticking_bound(problem: ContactProblem) -> Array | None:
 
     None where supports and frictionless contact balance all loads. Collective.
     """
-    modes, weight = UnconstrainedModes(problem), problem.nodes.weight
+    modes, weight = UnconstrainedModes.of(problem), problem.nodes.weight
     if not (problem.frictional and (modes.friction_alone or modes.overloaded(0 * weight))):
         return None
     # Friction need not bear the forces of prescribed displacements.

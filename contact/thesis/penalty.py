@@ -423,7 +423,7 @@ class Penalty(OuterLoop):
         A mode that friction alone constrains would be unconstrained at zero displacement.
         """
         law = PenalisedLaw(self.problem.interface, self._eps, jump)
-        if not law.acts() and UnconstrainedModes(self.problem).friction_alone:
+        if not law.acts() and UnconstrainedModes.of(self.problem).friction_alone:
             law.stick()
         return law
 

@@ -179,12 +179,12 @@ def test_the_friction_that_holds_a_block(dim, angle):
     """A thousandth more than its load holds it, a thousandth less does not, in any direction."""
     problem = build_problem(wall(dim, 1.0, angle), MPI.COMM_WORLD)
     (group,) = groups(problem)
-    friction = problem.nodes.weight * MU * PRESS
-    assert sliding_mode(group, 1.0, 1.001 * friction) is None
+    loads, friction = problem.body.external(1.0), problem.nodes.weight * MU * PRESS
+    assert sliding_mode(group, loads, 1.001 * friction) is None
     # Without any, all modes of the box along which loads act are alike.
-    assert sliding_mode(group, 1.0, 0.0 * friction) is not None
+    assert sliding_mode(group, loads, 0.0 * friction) is not None
     for part in (0.3, 0.999):
-        mode = sliding_mode(group, 1.0, part * friction)
+        mode = sliding_mode(group, loads, part * friction)
         named = {name: abs(size) for name, size in zip(group.names, mode, strict=True)}
         assert max(named, key=named.get) == f"translation along {'xyz'[dim - 1]}"
 
@@ -196,9 +196,9 @@ def test_the_friction_that_holds_a_block_on_a_layer(dim):
     case = wall(dim, 1.0, law="compliance", layer=np.inf, stiffness=1.0)
     problem = build_problem(case, MPI.COMM_WORLD)
     (group,) = groups(problem)
-    friction = problem.nodes.weight * MU * PRESS
-    assert sliding_mode(group, 1.0, 1.001 * friction) is None
-    assert sliding_mode(group, 1.0, 0.999 * friction) is not None
+    loads, friction = problem.body.external(1.0), problem.nodes.weight * MU * PRESS
+    assert sliding_mode(group, loads, 1.001 * friction) is None
+    assert sliding_mode(group, loads, 0.999 * friction) is not None
 
 
 @pytest.mark.parallel

@@ -38,7 +38,7 @@ def test_the_least_of_all_places():
     motions = "translation along x, translation along y, rotation"
     assert f"nothing holds ring against rigid motions ({motions})" in said
 
-    modes, body = UnconstrainedModes(problem), problem.body
+    modes, body = UnconstrainedModes.of(problem), problem.body
     found = modes.free_motion(problem, state)
     assert not found.limited
     assert np.abs(found.motion).max() < 1e-9
