@@ -133,13 +133,7 @@ def solve(
         return reviewed(solve_problem(case, options, monitor, partial(solve_static, start=start)))
     with naming_case(case.source):
         if case.adapt is not None:
-            solution = adapted(
-                case,
-                comm,
-                lambda problem, start: solve_problem(
-                    problem, options, monitor, solver_of(case, start)
-                ),
-            )
+            solution = solve_adapted(case, comm, options, monitor)
         else:
             problem, guess = build_problem(case, comm, **replacements), GIVEN
             if start is not None:
@@ -305,7 +299,18 @@ def solve_in_steps(
     return Solution(here, state, outcome, history, counters, name, {}, start=guess, steps=records)
 
 
-def solver_of(case: Case, start: State | None, guess: str = COARSE) -> Solver:
+def solve_adapted(
+    case: Case, comm: MPI.Intracomm, options: Options, monitor: Monitor | None = None
+) -> Solution:
+    """Solve a case on finer and finer meshes, by its `[mesh.adapt]`; not reviewed. Collective."""
+    return adapted(
+        case,
+        comm,
+        lambda problem, start: solve_problem(problem, options, monitor, solver_of(case, start)),
+    )
+
+
+def solver_of(case: Case, start: State | None = None, guess: str = COARSE) -> Solver:
     """Return the solver of a case: of its load steps, or from an initial guess."""
     if case.evolution is not None:
         return partial(solve_in_steps, times=case.evolution.step_times)

@@ -13,7 +13,6 @@ import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +40,7 @@ from contact.results.quantities import quantities, values_of
 from contact.results.quantity import SUMMARY, SWEEP, is_of
 from contact.results.remarks import evaluate_extremes
 from contact.solution import Solution
-from contact.solving import solve_in_steps, solve_problem, solve_static
+from contact.solving import solve_adapted, solve_problem, solve_static, solver_of
 from contact.typing import Array
 
 logger = logging.getLogger("contact.sweep")
@@ -283,22 +282,24 @@ class _Runner:
     def solve(self, case: Case) -> Solution:
         """Solve a case. Collective."""
         before, self._case = (self._case if self._warm else None), case
-        if before is None or before.mesh != case.mesh:
-            self._domain = None
-        problem = build_problem(case, self._comm, domain=self._domain)
-        self._domain = problem.domain
         with naming_case(case.source):
+            if case.adapt is not None:
+                return solve_adapted(case, self._comm, case.solver, self._monitor)
+            if case.mesh is not None and (before is None or before.mesh != case.mesh):
+                self._domain = case.mesh.build(self._comm)
+            problem = build_problem(case, self._comm, domain=self._domain)
             if case.evolution is not None:
-                steps = partial(solve_in_steps, times=case.evolution.step_times)
-                return solve_problem(problem, case.solver, self._monitor, steps)
-            if self._method is None or before is None or not _alike(before, case):
-                self._method = METHODS[case.solver.method](
-                    problem, self._settings(case), self._monitor
-                )
-                self._ends = []
+                solver = solver_of(case)
+                return solve_problem(problem, case.solver, self._monitor, solver)
+            method = self._method
+            alike = method is not None and method.problem.frictional == problem.frictional
+            if method is not None and before is not None and alike and _alike(before, case):
+                method.set_load_step(problem)
             else:
-                self._method.set_load_step(problem)
-            return self._static(problem, self._method)
+                made = METHODS[case.solver.method]
+                self._method = method = made(problem, self._settings(case), self._monitor)
+                self._ends = []
+            return self._static(problem, method)
 
     def _settings(self, case: Case) -> Options:
         """Return the method's options: the factorisation of a case may serve the next one."""
@@ -324,15 +325,7 @@ def _alike(before: Case, case: Case) -> bool:
         given.model_dump(exclude=set(LIGHT))
         | {
             "friction": None if given.friction is None else given.friction.law,
-            "fixed": [
-                (
-                    f.on,
-                    [c == "free" for c in f.displacement or ()],
-                    f.potential is None,
-                    f.normal is None,
-                )
-                for f in given.fixed
-            ],
+            "fixed": [(fixed.on, [*fixed.given]) for fixed in given.fixed],
         }
         for given in (before, case)
     )

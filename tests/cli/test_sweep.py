@@ -2,8 +2,13 @@
 
 import pytest
 
+from contact import load_case, solve
+from contact.case.file import to_toml
 from contact.cli.main import main
 from contact.plot.series import read_sweep, sweep_figure
+from contact.sweeping import Axis
+from contact.sweeping import sweep as sweep_of
+from tests.methods.test_belt import MU, PRESS, wall
 from tests.problems.bar import BAR
 from tests.problems.written import rows_of
 
@@ -185,3 +190,63 @@ def test_panels_of_a_sweep(tmp_path):
     assert pressure.get_ylabel() == "max pressure (MPa)"
     assert list(force.lines[0].get_xdata()) == [-4.0, -1.0]
     assert force.lines[0].get_label() == "friction.mu = 0.1"
+
+
+#: A block between a foundation and a wall, or of revolution.
+BLOCK = """\
+[mesh]
+generator = "rectangle"
+size = [2.0, 1.0]
+cells = [4, 2]
+[space]
+degree = 2
+[material]
+young = 1.0
+poisson = 0.3
+[[fixed]]
+on = "left"
+displacement = [0.0, "free"]
+[[load]]
+on = "top"
+traction = [0.001, -0.01]
+[contact]
+on = "bottom"
+[friction]
+law = "coulomb"
+mu = 0.4
+"""
+
+
+def check_rows(path, axis, folder):
+    """Compare each row of a sweep with the solution of its case alone."""
+    swept = Axis.of(axis)
+    for row, value in zip(sweep_of(path, [swept], folder), swept.values, strict=True):
+        alone = solve(load_case(path, [f"{swept.key}={value}"]))
+        assert row["converged"] == alone.converged
+        assert row["contact_force_y"] == pytest.approx(alone.contact_force[1], rel=1e-6)
+        assert row["max_pressure"] == pytest.approx(alone.pressure.max(), rel=1e-5)
+        assert row["max_displacement"] == pytest.approx(alone.max_displacement, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "axis",
+    [
+        "friction.mu=0.0,0.4",  # the first operator is symmetric
+        "fixed.0.displacement=[0.0,'free'],[0.0,0.0]",
+        "space.kinematics='axisymmetric','plane_strain'",  # another mesh
+        "mesh.adapt.error=0.05,0.02",  # other meshes, each of several solves
+        "contact.gap=0.0,0.001",
+    ],
+)
+def test_a_row_is_the_solution_of_its_case(tmp_path, axis):
+    """Whatever a sweep keeps of the row before: a mesh, a matrix."""
+    (tmp_path / "case.toml").write_text(BLOCK)
+    check_rows(tmp_path / "case.toml", axis, tmp_path)
+
+
+def test_an_overload_is_that_of_its_row(tmp_path):
+    """Friction holds the second load alone: limit analysis of the first one's would refuse it."""
+    (tmp_path / "case.toml").write_text(to_toml(wall(2, 1.0)))
+    most = MU * PRESS
+    loads = ",".join(f"[0.0,{-share * most}]" for share in (1.2, 0.99))
+    check_rows(tmp_path / "case.toml", f"load.0.body_force={loads}", tmp_path)
