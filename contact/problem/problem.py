@@ -159,6 +159,12 @@ class ContactProblem:
                     f"contact.name: {name!r} is that of several contacts; accepted: one each",
                     "contact-name",
                 )
+        if len(names) > 1 and "nodes" in names:
+            raise InputError(
+                "contact.name: given 'nodes' for one of several contacts; accepted: another name, "
+                "for the columns stick_nodes and slip_nodes are the numbers of nodes",
+                "contact-name",
+            )
         self.body = BodyEquilibrium(domain, self.description, degree, element)
         one = len(self.contacts) == 1
         pairs = {i: (c.on, c.against, c.press) for i, c in enumerate(self.contacts) if c.against}

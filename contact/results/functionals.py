@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ufl.core.expr import Expr
 
 from contact.body.loads import assembled
+from contact.mesh.contents import in_space
 from contact.mesh.domain import compiled
 from contact.model.body import Bolt, Electrode
 from contact.model.rigid import Rigid
@@ -112,25 +113,30 @@ def _by_layer(problem: ContactProblem, state: State, weights: Array) -> Array:
 
 @dataclass(frozen=True)
 class ContactForce:
-    """A component of the force of the body on the foundations, as ``contact_force_x``."""
+    """A component of the force of the body on the foundations, or of its moment."""
 
     axis: int
     contact: int | None = None  #: number of the contact; None for the sum of all
+    moment: bool = False  #: whether it is the moment about that axis through the origin
+
+    def _levers(self, problem: ContactProblem) -> Array:
+        """Return the derivatives by the stresses at the contact nodes over their areas, (n, d)."""
+        nodes, levers = problem.nodes, np.zeros_like(problem.nodes.normal)
+        if not self.moment:
+            levers[:, self.axis] = _share(problem, self.axis)
+        elif not problem.domain.revolved:
+            levers = np.cross(np.eye(3)[self.axis], in_space(nodes.points))[:, : nodes.dim]
+        return np.where(_of_contact(problem, self.contact)[:, None], levers, 0.0)
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
-        nodes = problem.nodes
         stress = problem.interface.traction(problem.nodal(state), state.forces)
-        own = _of_contact(problem, self.contact)
-        return _share(problem, self.axis) * nodes.sum(np.where(own, stress[:, self.axis], 0.0))
+        return problem.nodes.sum(np.einsum("nd,nd->n", self._levers(problem), stress))
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        nodes = problem.nodes
-        share = np.where(_of_contact(problem, self.contact), _share(problem, self.axis), 0.0)
-        by_force = np.zeros_like(nodes.normal)
-        by_force[:, self.axis] = share * nodes.weight
-        along = share * nodes.weight * nodes.normal[:, self.axis]
+        by_force = problem.nodes.weight[:, None] * self._levers(problem)
+        along = np.einsum("nd,nd->n", by_force, problem.nodes.normal)
         return _by_layer(problem, state, along), by_force
 
 
@@ -283,6 +289,14 @@ def contact_forces(problem: ContactProblem, contact: int | None = None) -> Funct
     """Return the components of the contact force, of all contacts or of one."""
     axes = AXES[: problem.dim]
     return {f"contact_force_{axis}": ContactForce(i, contact) for i, axis in enumerate(axes)}
+
+
+def contact_moments(problem: ContactProblem, contact: int | None = None) -> Functionals:
+    """Return the components of the contact moment, of all contacts or of one; in 2-D about z."""
+    if problem.dim == 2:
+        return {"contact_moment": ContactForce(2, contact, moment=True)}
+    about = {axis: ContactForce(i, contact, moment=True) for i, axis in enumerate(AXES)}
+    return {f"contact_moment_{axis}": found for axis, found in about.items()}
 
 
 def dissipations(problem: ContactProblem, contact: int | None = None) -> Functionals:

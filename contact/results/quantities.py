@@ -307,7 +307,7 @@ _OF_CONTACT = (
     ),
     Quantity(
         "contact_moment", "force · length", "its moment about the origin", lambda c: c.moment,
-        (CONTACTS,), VECTOR,
+        (CONTACTS,), VECTOR, functionals=f.contact_moments,
     ),
     Quantity("contact_area", "area", "as `contact_area`", lambda c: c.area, (CONTACTS,)),
     Quantity(
@@ -360,7 +360,8 @@ _RUN = (
     Quantity(
         "contact_moment", "force · length", "Moment of the contact forces about the origin of "
         "coordinates, at points of the reference configuration: in 2-D a list of one number, about "
-        "z and counter-clockwise, in 3-D a vector.", component=VECTOR,
+        "z and counter-clockwise, in 3-D a vector.",
+        files=_ALL, component=VECTOR, functionals=f.contact_moments,
     ),
     Quantity(
         "contacts", "", "Results of each contact, by its `name`: "

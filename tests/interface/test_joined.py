@@ -128,6 +128,7 @@ def test_two_electrodes_under_one_body() -> None:
     ("contact", "more", "message"),
     [
         ([{"on": "one"}, {"on": "one"}], {}, r"\[contact-name\]"),
+        ([{"on": "one"}, {"on": "two", "name": "nodes"}], {}, r"stick_nodes .*\[contact-name\]"),
         ([{"on": "one"}, {"on": "bottom"}], {}, r"\[contacts-meet\]"),
         (
             [{"on": "one", "friction": {"mu": 1}}, {"on": "two"}],
