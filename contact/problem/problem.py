@@ -218,7 +218,8 @@ class ContactProblem:
     def with_geometry(self, geometries: Sequence[Geometry]) -> ContactProblem:
         """Return the problem with its contacts at another place, each as of `Placement.at`.
 
-        The contact nodes, the history and the time are the same. Collective.
+        The contact nodes, the history and the time are the same; it has other matrices, so that a
+        method is made anew for it. Collective.
         """
         other = self._with(geometries=tuple(geometries))
         return other.with_interface(other._interface().at(self.time, self.slip_history))

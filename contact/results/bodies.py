@@ -174,6 +174,7 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     left = float(np.linalg.norm(body.norms(residual)[0]))
     whole = problem.interface.c_0 * problem.nodes.sum(np.ones_like(problem.nodes.weight))
     largest = solution.max_displacement
+    accepted = f"{'more ' if problem.frictional else ''}friction, or supports"
     for group, free in modes:
         shares, motions = _least_constrained(solution, group, free, solution.status != "open")
         share, motion = shares[0], motions[:, 0]
@@ -183,14 +184,14 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
         if share < EPS:
             yield (
                 f"nothing holds {name} against rigid motions ({words}): of all places the one with "
-                "the least displacements is given; accepted: friction, or supports"
+                f"the least displacements is given; accepted: {accepted}"
             )
             return
         moved = left * _reach(group, motion) / (whole * share)
         if share < CONSTRAINED or moved > MOVED * largest:
             yield (
                 f"contact resists a rigid motion of {name} ({words}) by next to nothing: residual "
-                f"forces may move it by up to {moved:.2g}; accepted: friction, or supports"
+                f"forces may move it by up to {moved:.2g}; accepted: {accepted}"
             )
             return
 
