@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,12 @@ def shown(table: Table, run: Run, touching: NDArray[np.bool_]) -> tuple[float, f
     return max(low, whole[0]), min(high, whole[1])
 
 
+def inside(table: Table, run: Run, name: str, limits: tuple[float, float]) -> Array:
+    """Return a column of the nodes that an axis along Gamma_3 shows."""
+    where = position(table, run)[0]
+    return table[name][(where >= limits[0]) & (where <= limits[1])]
+
+
 def ends(table: Table, held: Array) -> Array:
     """Return the ends of Gamma_3, (2, 2): contact nodes, or held ones, (n, 2), beside these."""
     points = np.column_stack([table["x"], table["y"]])
@@ -116,8 +123,13 @@ def draw_line(run: Run) -> Figure:
     figure = sheet((0.8 if frictional else 0.48) * (1.5 if narrow else 1.0))
     size = (2 if frictional else 1, len(parts))
     grid = figure.subplots(*size, sharex="col", sharey="row", squeeze=False)
-    for rows, part in zip(grid.T, parts, strict=True):
-        _draw_rows(rows, part, run, shown(part, run, part["status"] != "open"))
+    limits = [shown(part, run, part["status"] != "open") for part in parts]
+    for rows, part, borders in zip(grid.T, parts, limits, strict=True):
+        _draw_rows(rows, part, run, borders)
+    # A row has one scale, which no contact is beyond.
+    for axes, name, low in zip(grid, ("pressure", "bound"), (0.0, -1.0), strict=False):
+        each = zip(parts, limits, strict=True)
+        _focus(axes, [inside(part, run, name, borders) for part, borders in each], low)
     for ax in grid[:, 1:].ravel():
         ax.set_ylabel("")
     for ax, part in zip(grid[0] if len(parts) > 1 else [], parts, strict=False):
@@ -136,8 +148,7 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
     mark = "o" if len(where) == 1 else ""  # a line of one point is not seen
     bound, tau, units = table["bound"], table["tau"], run.units
     frictional = len(rows) > 1
-    inside = (where >= limits[0]) & (where <= limits[1])
-    seen = table["status"][inside]
+    seen = inside(table, run, "status", limits)
     for ax in rows:
         zones(ax, where, whole, table["status"][None], np.array([0.0, 1.0]))
     for zone, (colour, name) in ZONES.items():
@@ -146,7 +157,6 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
             rows[0].fill_between([], [], color=colour, lw=0, label=words)
     rows[0].plot(where, table["pressure"], color=BLUE, marker=mark, label=r"pressure $-\sigma_\nu$")
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
-    _focus(rows[0], table["pressure"][inside], 0.0)
     if np.all(seen == "open"):
         there = {"transform": rows[0].transAxes, "bbox": {"facecolor": "white", "lw": 0}}
         rows[0].text(0.5, 0.5, "no contact", ha="center", va="center", **there)
@@ -158,11 +168,11 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
         rows[1].plot(where, -bound, "--", color=GREY, lw=0.8)
         rows[1].axhline(0.0, color="black", lw=0.4)
         rows[1].set_ylabel(units.label(r"$-\sigma_\tau\cdot t$", "stress"))
-        _focus(rows[1], bound[inside], -1.0)
     if run.opposite is not None:
         _draw_opposite(rows[0], table, where, run.opposite, limits)
     rows[-1].set_xlabel(label)
     rows[0].set_xlim(limits)
+    rows[0].locator_params(axis="x", nbins=5 if len(run.contacts) > 1 else 10)
 
 
 def _draw_opposite(
@@ -185,15 +195,16 @@ def _draw_opposite(
     ax.plot(there[order], pressure, ":", color=GREY, lw=1.0, label="pressure on the other side")
 
 
-def _focus(ax: Axes, values: Array, low: float) -> None:
-    """Limit the axis where a singular corner would hide all else, and name the peak."""
-    largest = float(values.max(initial=0.0))
+def _focus(axes: Sequence[Axes], values: Sequence[Array], low: float) -> None:
+    """Limit axes where a singular corner would hide all else, and name the peaks."""
+    largest = max(float(own.max(initial=0.0)) for own in values)
     if largest <= 0:
-        ax.set(ylim=(low, 1.0), yticks=[0.0])  # there is no scale
+        axes[0].set(ylim=(low, 1.0), yticks=[0.0])  # there is no scale
         return
-    usual = float(np.quantile(values, 0.97, method="higher")) * 1.6
+    usual = 1.6 * max(float(np.quantile(own, 0.97, method="higher")) for own in values if own.size)
     top = usual if 0 < usual < 0.7 * largest else 1.05 * largest
-    ax.set_ylim(low * top, top)
-    if top < largest:
-        text = f"peak {largest:.3g}, cut off"
-        ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7)
+    axes[0].set_ylim(low * top, top)
+    at = {"xycoords": "axes fraction", "ha": "right", "va": "top", "fontsize": 7}
+    for ax, own in zip(axes, values, strict=True):
+        if top < own.max(initial=0.0):
+            ax.annotate(f"peak {own.max():.3g}, cut off", (0.99, 0.97), **at)

@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from contact import _compat
+from contact.errors import counted
 from contact.plot.contact import TOUCHING, patches
 from contact.plot.foundation import add_foundation, foundation
 from contact.plot.run import Run, linear, polygons
@@ -175,7 +176,7 @@ class Zone:
     corners: Array  #: the triangles that touch, shape (n, 3, 3)
     area: Array  #: their area vectors, shape (n, 3)
     displacement: Array  #: at the corners, shape (n, 3, 3)
-    pressure: Array  #: at the corners, shape (n, 3)
+    pressure: Array  #: at the corners, shape (n, 3), nan at nodes that supports hold
     normal: Array  #: mean normal of a side of it, shape (3,), that of an axis if it is nearly so
 
     @property
@@ -192,11 +193,11 @@ class Zone:
         chosen = touching if touching.any() else own
         faces, area = skin.regular_faces[chosen], areas(run, skin)[chosen]
         corners, moved = np.array([skin.points, skin["displacement"]], dtype=float)[:, faces]
-        pressure = np.nan_to_num(skin["pressure"])[faces]
+        pressure = np.asarray(skin["pressure"])[faces]
         size = np.linalg.norm(area, axis=1)
         normal = area.sum(axis=0)
         if np.linalg.norm(normal) < SIDED * size.sum():  # around a shaft, or between two plates
-            force = pressure.mean(axis=1)
+            force = np.nan_to_num(pressure).mean(axis=1)
             normal = area.T @ force
             if np.linalg.norm(normal) <= 0.1 * (size @ force):  # alike on all sides
                 normal = np.eye(3)[np.argmax(abs(area).sum(axis=0).round(6))]
@@ -301,11 +302,13 @@ class Scene:
         if grid.n_cells:
             _add_body(plotter, grid, **look)
         zone = self.zone
-        if self.painted and zone.pressure.any():  # a little in front of the body
+        known = np.isfinite(zone.pressure).all(axis=1)
+        if self.painted and zone.pressure[known].any():  # a little in front of the body
             size = float(np.ptp(self.body.points, axis=0).max())
             out = zone.area / np.linalg.norm(zone.area, axis=1)[:, None]
-            mesh = polygons(zone.corners + zone.displacement + LIFTED * size * out[:, None])
-            mesh["pressure"] = zone.pressure.ravel()
+            moved = zone.corners + zone.displacement + LIFTED * size * out[:, None]
+            mesh = polygons(moved[known])
+            mesh["pressure"] = zone.pressure[known].ravel()
             plotter.add_mesh(mesh, show_scalar_bar=False, **self.colours)
 
     def window(self, label: str) -> Any:
@@ -355,7 +358,7 @@ def contact_figure(run: Run, look: Look) -> Figure:
     others = [] if run.opposite is None else [run.opposite]
     closes = close_ups(run, scene.zone)
     rows, columns = 2 + len(others), len(closes)
-    shades = {**scene.colours, "nan_color": ZONES["open"][0]}
+    shades = {**scene.colours, "nan_color": UNKNOWN}
     figure = sheet(2.1 if narrow else 0.7 if rows == 2 else 0.95)
     figure.set_layout_engine("constrained")
     grid = (
@@ -404,7 +407,7 @@ def _legend(run: Run, scene: Scene, frictional: bool) -> list[Patch]:
     found = patches(frictional)
     for patch, zone in zip(found, ZONES if frictional else TOUCHING, strict=True):
         count = np.count_nonzero(run.table["status"] == zone)
-        patch.set_label(f"{patch.get_label()}: {count} nodes")
+        patch.set_label(f"{patch.get_label()}: {counted(count, 'node')}")
     if scene.foundation.n_cells:
         found.append(Patch(facecolor=to_rgba(SKY, 0.3), edgecolor=BLUE, label="foundation"))
     return found

@@ -102,6 +102,21 @@ def test_a_small_contact_zone_is_drawn_with_its_vicinity() -> None:
     assert low < 1 - width < 1 + width < high and high - low < 0.3
 
 
+def test_axes_of_several_contacts_are_those_of_all() -> None:
+    """Those of the second, which has no friction and less pressure, hid the first."""
+    pieces = {"one": (0.0, 0.75), "two": (1.25, 2.0)}
+    parts = {name: {"side": "bottom", "from": a, "to": b} for name, (a, b) in pieces.items()}
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4], "parts": parts}
+    rubs = {"law": "coulomb", "mu": 0.3}
+    contact = [{"on": "one", "friction": rubs}, {"on": "two", "gap": 0.04}]
+    run = run_of(solve(block(2, mesh=mesh, contact=contact, friction={"law": "none"})))
+    first, second = run.contacts
+    assert first["pressure"].max() > 2 * second["pressure"].max() > 0
+    axes = draw_line(run).axes
+    assert all(ax.get_ylim()[1] >= 0.7 * first["pressure"].max() for ax in axes[:2])
+    assert all(0 < 0.7 * first["bound"].max() <= ax.get_ylim()[1] < 0.9 for ax in axes[2:])
+
+
 def test_regions_are_classes_with_names() -> None:
     """Not a bar of numbers."""
     mesh = {

@@ -193,6 +193,17 @@ def test_planes_that_meet_end_there() -> None:
     )
 
 
+def test_the_pressure_of_held_nodes_is_not_known() -> None:
+    """They are no contact nodes; they had the colour of no pressure."""
+    free = ["free", 0.0, 0.0]
+    run = pressed(fixed=[{"on": "top", "displacement": [0.0, 0.0, -1e-3]},
+                         {"on": "left", "displacement": free}])  # fmt: skip
+    zone = Zone.of(run, run.table["entry"])
+    held = zone.corners[..., 0] == 0
+    assert held.any()
+    np.testing.assert_array_equal(np.isnan(zone.pressure), held)
+
+
 def test_the_peak_is_that_of_all_nodes() -> None:
     """Of the body inside it, and of contact nodes that are cut off."""
     run = pressed()
