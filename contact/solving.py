@@ -175,6 +175,8 @@ def solve_steps(
     """
     expect("solve_steps", problem, "a Problem", isinstance(problem, ContactProblem))
     _check_types(settings, monitor)
+    for record in kept:
+        _check_state("kept", problem, record.state)
     ends = _checked_times(problem, times, 0.0)
     steps = partial(solve_in_steps, times=(0.0, *ends), kept=kept, keep=keep)
     return reviewed(solve_problem(problem, settings or NewtonOptions(), monitor, steps))
@@ -229,6 +231,9 @@ def evolve(
     _check_types(settings, monitor, start)
     earlier = before is None or (isinstance(before, State) and start is not None)
     expect("before", before, "the state before start", earlier)
+    for name, state in (("start", start), ("before", before)):
+        if state is not None:
+            _check_state(name, problem, state)
     begin = 0.0 if start is None else start.time
     ends = _checked_times(problem, times, begin)
     check_variables(problem.body)
@@ -366,16 +371,21 @@ def reviewed(
 
 def _prescribed(problem: ContactProblem, start: State) -> State:
     """Return an initial guess with the values that the problem prescribes. Collective."""
-    zero, nodes = problem.start(), problem.nodes.nodes.size
-    fits = start.x.shape == zero.x.shape and start.forces.contact.shape == (nodes,)
+    _check_state("start", problem, start)
+    x = problem.body.prescribe(start.x, problem.time)
+    return State(x, start.forces, problem.time, problem.history)
+
+
+def _check_state(name: str, problem: ContactProblem, state: State) -> None:
+    """Refuse a state of another problem. Collective."""
+    unknowns, nodes = problem.start().x.shape, problem.nodes.nodes.size
+    fits = state.x.shape == unknowns and state.forces.contact.shape == (nodes,)
     if not problem.comm.allreduce(fits, op=MPI.LAND):
         raise InputError(
-            "start: given a state of another problem; accepted: one with the same mesh, elements "
+            f"{name}: given a state of another problem; accepted: one with the same mesh, elements "
             "and contact nodes, on the same ranks",
             "start",
         )
-    x = problem.body.prescribe(start.x, problem.time)
-    return State(x, start.forces, problem.time, problem.history)
 
 
 def _check_types(settings: object, monitor: object, start: object = None) -> None:

@@ -88,6 +88,11 @@ def build_problem(
             domain = case.mesh.build(comm)
         if case.space.kinematics == "axisymmetric":
             domain = revolved(domain)
+        elif domain.revolved:
+            accepted = 'space.kinematics = "axisymmetric", or a mesh that is not revolved'
+            raise InputError(
+                f"domain: given a body of revolution; accepted: {accepted}", "axisymmetric"
+            )
         check_range("mesh", domain.size)
         check_mesh(case, domain.dim, domain.names)
         body = Body(

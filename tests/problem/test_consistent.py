@@ -35,7 +35,10 @@ from contact import (
     solve,
     solve_steps,
 )
+from contact.case.build import build_problem
+from contact.errors import InputError
 from contact.problem.checks import meeting_supports
+from tests.problems.bar import changed
 from tests.problems.messages import message_of
 from tests.problems.put_together import LAW, TOP, block, problem
 
@@ -196,6 +199,29 @@ def test_a_solution_at_a_step_is_a_start_and_has_figures():
     step = solution.at_step(solution.state)
     assert type(step) is Solution
     assert solve(problem(), start=step).converged
+
+
+def test_a_half_plane_is_no_mesh_of_a_plane_case():
+    """The domain of a solution of revolution was solved as that, whatever the case said."""
+    turned = changed(fixed__0__displacement=[0.0, "free"], space__kinematics="axisymmetric")
+    domain = build_problem(parse_case(turned)).domain
+    with pytest.raises(InputError, match=r"domain: given a body of revolution.*\[axisymmetric\]"):
+        build_problem(parse_case(changed()), domain=domain)
+    assert build_problem(parse_case(turned), domain=domain).domain.revolved
+
+
+@pytest.mark.parametrize("given", ["start", "before", "kept"])
+def test_a_state_of_another_problem_is_no_start(given):
+    """It ended in an error of NumPy, or evolve and solve_steps went on with it."""
+    other = parse_case(changed(mesh__cells=[4, 2], evolution={"times": [0.0, 1.0], "steps": [2]}))
+    run = solve(other)
+    with pytest.raises(InputError, match=rf"{given}: given a state of another problem.*\[start\]"):
+        if given == "kept":
+            solve_steps(problem(), [1.0, 2.0], kept=run.steps)
+        else:
+            own = next(evolve(problem(), [0.5]))
+            states = {"start": own, "before": own} | {given: run.state}
+            next(evolve(problem(), [2.0], **states))
 
 
 @pytest.mark.parallel(2)
