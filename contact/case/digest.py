@@ -20,6 +20,9 @@ from contact.model.section import FilePath, walk
 #: Key of the mesh file.
 MESH = "mesh.file"
 
+#: Keys of files: their contents are compared by digests, and their folders may differ.
+FILES = ("file", "library")
+
 #: Sections that say how a problem is solved and shown, not which one it is.
 MANNER = frozenset({"title", "case", "solver", "output"})
 
@@ -90,5 +93,8 @@ def _differences(before: Any, now: Any, path: str = "") -> Iterator[str]:
                 yield f"{place} is {'given' if key in before else 'missing'}"
             else:
                 yield from _differences(before[key], now[key], place)
+    elif path.rpartition(".")[2] in FILES and isinstance(before, str) and isinstance(now, str):
+        if Path(before).name != Path(now).name:
+            yield f"{path} is {shown(before)}, here {shown(now)}"
     elif before != now and not (before != before and now != now):
         yield f"{path} is {shown(before)}, here {shown(now)}"

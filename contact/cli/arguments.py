@@ -188,7 +188,10 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
     )
     solve.add_argument("case", metavar="CASE.toml", help="case file (TOML)", nargs="?")
     check.add_argument(
-        "--plot", **FLAG, help="draw the set-up too: CASE-setup.png and .pdf in the present folder"
+        "--plot",
+        **FLAG,
+        help="draw the set-up too: CASE-setup.png and .pdf in the present folder, which it "
+        "replaces",
     )
     solve.add_argument("--plot", **FLAG, help="draw the figures too")
     solve.add_argument("--out", metavar="DIR", help="folder for results")

@@ -172,7 +172,7 @@ def check_names(folder: Path, names: Iterator[str] | Sequence[str], overwrite: b
         if not overwrite and name not in own:
             raise InputError(
                 f"{path}: given {found} that no run's {SUMMARY} there names as its own; accepted: "
-                "--overwrite to replace it, or another folder",
+                "a folder without it, or contact solve --overwrite to replace it",
                 "not-ours",
             )
 

@@ -200,7 +200,7 @@ def test_a_file_under_the_name_of_a_result_is_replaced_when_that_is_asked_for(
     on_root(comm, lambda: before.update(mine(out, name)))
     assert on_the_line("solve", cases["static"], "--out", out) == 2
     if comm.rank == 0:
-        assert "accepted: --overwrite to replace" in capfd.readouterr().err
+        assert "contact solve --overwrite to replace it" in capfd.readouterr().err
         assert contents(out) == before
     comm.barrier()
     assert on_the_line("solve", cases["static"], "--out", out, "--overwrite") == 0

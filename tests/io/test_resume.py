@@ -152,6 +152,20 @@ def test_the_command_line(tmp_path, capfd):
     assert len((out / "steps.csv").read_text().splitlines()) == 6
 
 
+def test_a_complete_run_may_be_run_again_and_go_on_anywhere(tmp_path, monkeypatch):
+    """A case with a file was another case from another folder, and after an interruption."""
+    (tmp_path / "press.csv").write_text("t,factor\n0.0,0.0\n1.0,1.0\n2.0,0.5\n")
+    before, _, _ = to_toml(steps_case()).rpartition("time = ")
+    monkeypatch.chdir(tmp_path)
+    Path("case.toml").write_text(f'{before}file = "press.csv"\n')
+    assert on_the_line("solve", "case.toml", "--out", "out") == 0
+    with ended(2):
+        on_the_line("solve", "case.toml", "--out", "out")
+    assert on_the_line("solve", "--restart", "out") == 0
+    monkeypatch.chdir("/")
+    assert on_the_line("solve", tmp_path / "case.toml", "--out", tmp_path / "out") == 0
+
+
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number, status):
     """They are written, and checkpoints remain to go on from, to the numbers of a whole run."""
