@@ -234,7 +234,9 @@ class Linearised:
             rhs -= self._operator.multiply(dx, transposed=True)
             nodes.add_jump_transposed(-by_jump, rhs)
             size, steps = max(size, self._norm(x, c)), [*steps, self._norm(dx, dc)]
-            if self._enough(steps, size):
+            # Displacements that are rounding beside those of such conditions at the nodes.
+            at_nodes = np.divide(c, weight, out=np.zeros_like(c), where=weight > 0)
+            if steps[-1] <= EPS * nodes.norm(at_nodes) or self._enough(steps, size):
                 return x, c
 
     def by_gap(self, x: Array, conditions: Array) -> Array:

@@ -181,6 +181,30 @@ class MaxPressure(Largest):
 
 
 @dataclass(frozen=True)
+class MeanPressure:
+    """The mean pressure of a contact over the nodes that it presses; their area does not vary."""
+
+    contact: int  #: its number
+
+    def _pressures(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return the pressures of its nodes, and their shares of the area, (n,)."""
+        pressure = problem.interface.pressure(problem.nodal(state), state.forces)
+        pressed = _of_contact(problem, self.contact) & (pressure > 0)
+        area = problem.nodes.sum(pressed.astype(np.float64))
+        return pressure, np.where(pressed, problem.nodes.weight / (area or 1.0), 0.0)
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return it. Collective."""
+        pressure, shares = self._pressures(problem, state)
+        return float(summed(problem.comm, shares @ pressure))
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return the derivatives. Collective."""
+        shares = self._pressures(problem, state)[1]
+        return _by_layer(problem, state, shares), shares[:, None] * problem.nodes.normal
+
+
+@dataclass(frozen=True)
 class MaxDisplacement(Largest):
     """The largest norm of the displacement over the nodes."""
 
@@ -283,6 +307,11 @@ def _largest(problem: ContactProblem, values: Array) -> Array:
 def max_pressures(problem: ContactProblem, contact: int | None = None) -> Functionals:
     """Return the largest pressure, of all contacts or of one."""
     return {"max_pressure": MaxPressure(contact)}
+
+
+def mean_pressures(problem: ContactProblem, contact: int) -> Functionals:
+    """Return the mean pressure of one contact."""
+    return {"mean_pressure": MeanPressure(contact)}
 
 
 def contact_forces(problem: ContactProblem, contact: int | None = None) -> Functionals:

@@ -313,7 +313,10 @@ _OF_CONTACT = (
     Quantity(
         "max_pressure", "stress", "the largest", files=(CONTACTS,), functionals=f.max_pressures
     ),
-    Quantity("mean_pressure", "stress", "the mean over that area", files=(CONTACTS,)),
+    Quantity(
+        "mean_pressure", "stress", "the mean over that area", files=(CONTACTS,),
+        functionals=f.mean_pressures,
+    ),
     Quantity("stick", "", "share of that area", files=(CONTACTS,)),
     Quantity("slip", "", "likewise", files=(CONTACTS,)),
     Quantity(
