@@ -39,16 +39,26 @@ from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh
 from contact.problem.linearised import Equations
 from contact.results.quantities import named_functionals
-from scripts.studies.derivatives import FAMILIES, FURTHER, by_both, problem, series, size_of, values
 from tests.problems.rigid import indented
+from tests.problems.taylor import (
+    PROBLEMS,
+    block,
+    by_both,
+    plastic,
+    series,
+    slipping,
+    space,
+    two_bodies,
+    values,
+)
 
 SELF = MPI.COMM_SELF
 
 
 @cache
-def solution(family):
+def solution(name):
     """Return the solution of a problem, which no test changes."""
-    return solve(parse_case(problem(family)), comm=SELF)
+    return solve(parse_case(PROBLEMS[name].tables()), comm=SELF)
 
 
 @pytest.mark.core
@@ -64,10 +74,10 @@ def test_bar_by_its_friction_coefficient():
     assert [found[name]["material.young"] for name in names] == pytest.approx([0, 0, 0], abs=1e-11)
 
 
-@pytest.mark.core("number", "log", "3-D", "smoothed")
-@pytest.mark.parametrize("family", FAMILIES)
-def test_taylor_series_and_adjoint(family):
-    found = series(family, SELF)
+@pytest.mark.core("smoothed", "revolved", "3-D")
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_taylor_series_and_adjoint(name):
+    found = series(name, SELF)
     assert found.weak == 0
     assert found.order == pytest.approx(2, abs=0.02)
     assert found.apart < 1e-6
@@ -77,7 +87,7 @@ def test_taylor_series_and_adjoint(family):
 @pytest.mark.parametrize("kinematic", [0.3, [{"modulus": 0.3, "recovery": 20.0}]])
 def test_a_law_without_a_differential_of_its_own(kinematic):
     # Differences of the stress update, whose transpose is made of the same numbers.
-    data = problem("evolution, j2")
+    data = plastic()
     data["material"]["kinematic"] = kinematic
     # A reaction depends on the history of the last step by itself.
     case, names = parse_case(data), ["contact_force_x", "max_pressure", "reaction_x_top"]
@@ -105,29 +115,32 @@ def test_a_law_without_a_differential_of_its_own(kinematic):
 
 @pytest.mark.core
 @pytest.mark.parallel(alone=False)
-@pytest.mark.parametrize("family", ["two bodies", "ball under a force", "evolution", *FURTHER])
-def test_ranks(family):
-    names, keys = ["contact_force_x", "max_pressure"], ["material.0.young", "friction.mu"]
-    keys[0] = keys[0] if family == "two bodies" else "material.young"
-    if family == "turning plate":
-        names, keys = ["max_displacement", "max_pressure"], ["rigid.0.centre.0", "mesh.size.1"]
-    if family == "numbers at 0":
-        keys = ["contact.foundation.centre.0", "friction.mu.rho"]
-    runs = [solve(parse_case(problem(family)), comm=comm) for comm in (MPI.COMM_WORLD, SELF)]
+@pytest.mark.parametrize(
+    ("name", "result", "keys"),
+    [
+        ("two bodies", "contact_force_x", ["material.0.young", "friction.mu"]),
+        ("ball", "contact_force_x", ["material.young", "friction.mu"]),
+        ("slipping", "contact_force_x", ["material.young", "friction.mu.a"]),
+        ("plate", "max_displacement", ["rigid.0.centre.0", "mesh.size.1"]),
+    ],
+)
+def test_ranks(name, result, keys):
+    names, tables = [result, "max_pressure"], PROBLEMS[name].tables
+    runs = [solve(parse_case(tables()), comm=comm) for comm in (MPI.COMM_WORLD, SELF)]
     found = [by_both(run, names, keys) for run in runs]
     run = runs[1]
     alone = found[1][0]
     for one in (*found[0], found[1][1]):
         for name in names:
             for key in keys:
-                size = abs(values(run, [name])[0]) / size_of(run.source, key)
+                size = abs(values(run, [name])[0] / number_at(run.source, key))
                 close = max(1e-11, 1e-9 * size)
                 assert one[name][key] == pytest.approx(alone[name][key], rel=1e-7, abs=close)
 
 
 @pytest.mark.core
 def test_steps_and_their_adjoint():
-    run = solution("evolution, slip")
+    run = solution("slipping")
     keys = ["friction.mu.a", "material.young", "fixed.1.displacement.0"]
     found = sensitivity(run, ["contact_force_x"], keys, "tangent")
     adjoint = sensitivity(run, ["contact_force_x"], keys)
@@ -137,7 +150,7 @@ def test_steps_and_their_adjoint():
         assert steps.shape == (6,)
         assert adjoint["contact_force_x"][key] == pytest.approx(steps[-1], rel=1e-9)
     # each step by itself is the end of a shorter run
-    data = problem("evolution, slip")
+    data = slipping()
     data["evolution"] |= {"times": [0.0, 1.0, 2.0], "steps": [2, 2]}
     shorter = sensitivity(solve(parse_case(data), comm=SELF), ["contact_force_x"], keys)
     for key in keys:
@@ -179,14 +192,14 @@ def test_hertz_exponents():
 
 
 @pytest.mark.core
-@pytest.mark.parametrize("family", ["number", "evolution", "two bodies", "3-D"])
-def test_gradient_by_the_gap(family):
-    data = problem(family)
+@pytest.mark.parametrize("make", [block, slipping, two_bodies, space])
+def test_gradient_by_the_gap(make):
+    data = make()
     data["contact"].setdefault("gap", 0.0)
     base = build_problem(parse_case(data), SELF)
-    times = [1.0] if family != "evolution" else [1 / 3, 2 / 3, 1.0, 4 / 3, 5 / 3, 2.0, 2.5, 3.0]
+    times = [1.0] if make != slipping else [1 / 3, 2 / 3, 1.0, 4 / 3, 5 / 3, 2.0, 2.5, 3.0]
     tight = NewtonOptions(tolerance=1e-13)
-    name = "max_pressure" if family == "two bodies" else "contact_force_y"
+    name = "max_pressure" if make == two_bodies else "contact_force_y"
     gradient = gap_gradient(solve_steps(base, times, tight), name)
     change = np.cos(3 * base.nodes.points[:, 0])
 
@@ -251,12 +264,12 @@ def test_a_node_at_its_bound_is_named_and_the_derivative_is_one_sided():
 
 
 @pytest.mark.parallel(2)
-@pytest.mark.parametrize("family", ["evolution, j2", "evolution, slip", "two bodies", "piezo"])
-def test_gradient_by_a_field_adds_up(family):
-    key = "material.0.young" if family == "two bodies" else "material.young"
+@pytest.mark.parametrize("name", ["plastic", "slipping", "two bodies", "charged"])
+def test_gradient_by_a_field_adds_up(name):
+    key = "material.0.young" if name == "two bodies" else "material.young"
     names = ["contact_force_y", "max_pressure"]
-    names += ["charge_top"] if family == "piezo" else ["max_displacement"]
-    run = solve(parse_case(problem(family)), comm=MPI.COMM_WORLD)
+    names += ["charge_foundation"] if name == "charged" else ["max_displacement"]
+    run = solve(parse_case(PROBLEMS[name].tables()), comm=MPI.COMM_WORLD)
     found = sensitivity(run, names, [key])
     for name, degree in zip(names, (0, 1, 0), strict=True):
         gradient = field_gradient(run, name, key, degree)
@@ -345,7 +358,7 @@ def test_a_modulus_that_is_a_field_and_its_gradient(law, degree):
 
 
 def test_gradients_cost_no_more_than_one_parameter(monkeypatch):
-    run, taken = solution("number"), []
+    run, taken = solution("3-D"), []
     transposed = SparseOperator.solve_transposed
 
     def counted(self, rhs, *more):
@@ -386,25 +399,21 @@ def products(solution):
 
 
 @pytest.mark.core
-@pytest.mark.parametrize(
-    "family", ["slip", "smoothed", "evolution, electrode", "ball under a force"]
-)
-def test_transposed_solves(family):
-    assert products(solution(family)) < 1e-12
+@pytest.mark.parametrize("name", ["smoothed", "charged", "ball"])
+def test_transposed_solves(name):
+    assert products(solution(name)) < 1e-12
 
 
 @pytest.mark.core
-@pytest.mark.parametrize(
-    "family", ["slip", "smoothed", "evolution, electrode", "ball under a force"]
-)
-def test_transposed_solves_by_multigrid(family):
+@pytest.mark.parametrize("name", ["smoothed", "charged", "ball"])
+def test_transposed_solves_by_multigrid(name):
     """As of large bodies: q was eliminated twice."""
     with patch.object(multigrid, "LARGE", dict.fromkeys(multigrid.LARGE, 0)):
-        assert products(solution(family)) < 1e-9
+        assert products(solution(name)) < 1e-9
 
 
 def test_an_unsymmetric_stiffness_beside_a_free_foundation_is_refused():
-    data = problem("ball under a force")
+    data = PROBLEMS["ball"].tables()
     kinematic = [{"modulus": 0.3, "recovery": 5.0}]
     data["material"] = {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 1.0}
     data["material"]["kinematic"] = kinematic
@@ -423,22 +432,20 @@ def test_an_unsymmetric_stiffness_beside_a_free_foundation_is_refused():
     ],
 )
 def test_refused(quantity, parameter, message):
-    run = solution("number")
+    run = solution("3-D")
     with pytest.raises(InputError, match=message):
         sensitivity(run, [quantity], [parameter])
 
 
 def test_a_friction_coefficient_of_0_is_refused():
-    data = problem("number")
-    data["friction"]["mu"] = 0.0
+    data = parse_case(block(friction={"law": "coulomb", "mu": 0.0}))
     with pytest.raises(InputError, match=r"\[value\]"):
-        sensitivity(solve(parse_case(data), comm=SELF), ["max_pressure"], ["friction.mu"])
+        sensitivity(solve(data, comm=SELF), ["max_pressure"], ["friction.mu"])
 
 
 def test_an_end_that_has_not_converged_is_refused():
-    data = problem("log")
-    data["solver"] = {"max_outer": 1}
-    run = solve(parse_case(data), comm=SELF)
+    law = {"law": "log", "young": 1.0, "poisson": 0.3, "yield_strain": 0.01}
+    run = solve(parse_case(block(material=law, solver={"max_outer": 1})), comm=SELF)
     assert not run.converged
     with pytest.raises(InputError, match=r"\[no-derivative\]"):
         sensitivity(run, ["max_pressure"], ["friction.mu"])

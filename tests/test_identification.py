@@ -11,15 +11,15 @@ from contact.case.file import number_at, to_toml, with_number
 from contact.cli.identify import report
 from contact.cli.main import main
 from contact.derivatives.identification import _least
-from scripts.studies.derivatives import problem
 from scripts.studies.identification import coverage
+from tests.problems.taylor import block, evolving
 
 SELF = MPI.COMM_SELF
 COLUMNS = ("contact_force_x", "contact_force_y")
 
 
 def case():
-    return parse_case(problem("evolution"))
+    return parse_case(evolving(block()))
 
 
 @cache
@@ -113,7 +113,7 @@ def with_columns(given, columns):
 
 def loaded(mu=0.3):
     """Return the block with a load on its held top, and two equal ones on its left side."""
-    data = problem("evolution")
+    data = evolving(block())
     data["fixed"][1]["displacement"] = [data["fixed"][1]["displacement"][0], "free"]
     load = {"traction": [0.002, 0.0], "amplitude": "constant"}
     data["load"] = [{"on": on, **load} for on in ("top", "left", "left")]

@@ -1,6 +1,6 @@
 """Parameters from noisy loops of fretting: how often their intervals contain the right ones.
 
-`python3 -m scripts.studies.identification [--out DIR] [--count N] [--coarse]`. A block is pressed,
+`python3 -m scripts.studies.identification [--out DIR] [--coarse]`. A block is pressed,
 sheared and sheared back; its forces with normal noise of 1 % of the largest ones are the
 measurements. Modulus and coefficient of friction are sought from a wrong start.
 """
@@ -8,7 +8,6 @@ measurements. Modulus and coefficient of friction are sought from a wrong start.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from scipy.stats import t as student
@@ -19,7 +18,7 @@ from contact.cli.identify import draw
 from contact.results.solution import Solution
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, append, empty, parser, solved
+from scripts.reporting import Report, append, empty, solved
 
 #: Parameters, measured columns, noise over the largest value, and probability of the intervals.
 KEYS, MEASURED = ("friction.mu", "material.young"), ("contact_force_x", "contact_force_y")
@@ -49,16 +48,13 @@ def measurement(solution: Solution, seed: int, noise: float = NOISE) -> dict[str
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table and the figure."""
-    made = parser(__doc__, "derivatives")
-    made.add_argument("--count", type=int, default=20, help="number of repetitions")
-    given = made.parse_args(arguments)
-    report, case = Report(given.out), fretting()
+    report, case = Report.of(__doc__, "derivatives", arguments), fretting()
     right, wrong = solved(case), case
     for key, factor in zip(KEYS, (1.5, 0.7), strict=True):
         wrong = with_number(wrong, key, factor * number_at(case, key))
     columns = empty("repetition", "mu", "from", "to", "E", "E from", "E to", "both in", "runs")
     inside = np.zeros(len(KEYS), dtype=int)
-    for seed in range(1 if given.coarse else given.count):
+    for seed in range(1 if report.coarse else 20):
         data = measurement(right, seed)
         found = identify(wrong, data, KEYS, {"friction.mu": (0.0, 1.0)}, LEVEL)
         ends = [found.intervals[key] for key in KEYS]
@@ -68,9 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
                   for x in (found.parameters[key], *pair)]  # fmt: skip
         append(columns, seed, *values, all(within), found.evaluations)
         if seed == 0:
-            path = Path(report.out) / "identified.png"
-            path.parent.mkdir(parents=True, exist_ok=True)
-            draw(found, data, path)
+            report.out.mkdir(parents=True, exist_ok=True)
+            draw(found, data, report.out / "identified.png")
     counted = coverage(right)
     report.table(
         "identified",

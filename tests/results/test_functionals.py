@@ -11,8 +11,8 @@ from contact import load_case, parse_case, sensitivity, solve
 from contact.case.file import number_at, with_number
 from contact.results.functionals import Differentiable, Integral
 from contact.results.quantities import named_functionals
-from scripts.studies.derivatives import problem
 from tests.problems.clamped import clamped
+from tests.problems.taylor import block, charged, evolving, plastic, slipping
 
 SELF = MPI.COMM_SELF
 
@@ -33,8 +33,11 @@ def plate():
     ))  # fmt: skip
 
 
-def family(name):
-    return parse_case(problem(name))
+def hencky():
+    """Return the evolution of a block by Hencky's law."""
+    law = {"law": "log", "young": 1.05, "poisson": 0.21, "yield_strain": 0.01}
+    top = {"on": "top", "displacement": [0.0015, -0.0169]}
+    return parse_case(evolving(block(material=law, fixed=[top])))
 
 
 def energy(run):
@@ -61,10 +64,10 @@ def bolted():
 CASES = {
     "bolt": bolted,
     "plate": plate,
-    "slip": lambda: family("evolution, slip"),
-    "log": lambda: family("evolution, log"),
-    "j2": lambda: family("evolution, j2"),
-    "electrode": lambda: family("evolution, electrode"),
+    "slip": lambda: parse_case(slipping()),
+    "log": hencky,
+    "j2": lambda: parse_case(plastic()),
+    "electrode": lambda: parse_case(charged()),
     "ring": lambda: load_case(
         "scripts/cases/ring-on-mandrel.toml", ["mesh.cells=[4,3]", "evolution.steps=[3,3]"]
     ),
@@ -121,7 +124,7 @@ def test_derivatives_of_all_columns(name):
 def test_an_integral_of_ones_own(on):
     """A quadratic density: central differences are exact, and its value is that of NumPy."""
     if on is None:
-        run = solve(family("evolution, electrode"), comm=MPI.COMM_WORLD)
+        run = solve(parse_case(charged()), comm=MPI.COMM_WORLD)
     else:
         run = solve(plate(), comm=MPI.COMM_WORLD)
     problem, state, body = run.problem, run.state, run.problem.body
