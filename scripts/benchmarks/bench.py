@@ -1,10 +1,10 @@
-"""The benchmark: `python3 -m scripts.benchmarks.bench [--coarse] [--large] [--parts NAME ...]`.
+"""The benchmark: `python3 -m scripts.benchmarks.bench [--coarse] [--parts NAME ...]`.
 
 `PARTS` has the parts, in the order of the page.
 
 All of it takes half an hour on two cores and 4 GB, and writes docs/benchmarks.md, its summary
 and the table of docs/scaling.md after each part: after an interruption --parts goes on with
-the others. --large adds meshes of two million unknowns, --coarse is a trial that writes nothing.
+the others. --coarse is a trial that writes no page.
 Every measurement is a process of its own, warm (its forms are compiled) and with one BLAS thread a
 rank; ratios are taken within one process. Absolute times are those of the machine.
 """
@@ -16,13 +16,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from meshes import write
-from scripts.benchmarks.pages import write_memory, write_page
+from scripts.benchmarks.pages import PAGE, SCALING, write_memory, write_page
 from scripts.benchmarks.processes import Run, command, measured, run, started
 from scripts.reporting import Report, parser
 
@@ -30,33 +30,17 @@ from scripts.reporting import Report, parser
 TIMEOUT = 150.0
 
 
-@dataclass(frozen=True)
-class Bench:
-    """Where results go, and how large the meshes are."""
-
-    #: The folder.
-    report: Report
-    #: The smallest meshes alone; the largest ones too.
-    coarse: bool
-    large: bool
-
-    def sizes(self, coarse: Sequence[int], usual: Sequence[int], large: Sequence[int]) -> list[int]:
-        """Return the sizes that are asked for."""
-        return [*coarse] if self.coarse else [*usual, *(large if self.large else ())]
-
-    def script(self, name: str, *arguments: str) -> None:
-        """Run a script that writes into the same folder."""
-        extra = ["--coarse"] if self.coarse else []
-        started([*command(name), "--out", str(self.report.out), *extra, *arguments])
+def script(report: Report, name: str) -> None:
+    """Run a script that writes into the same folder."""
+    extra = ["--coarse"] if report.coarse else []
+    started([*command(name), "--out", str(report.out), *extra])
 
 
-def against_one_solve(bench: Bench) -> None:
+def against_one_solve(report: Report) -> None:
     """Nonlinear solves in units of one linear elasticity solve."""
     rows = []
-    sizes = {
-        2: bench.sizes((16, 32), (64, 128, 256), (512,)),
-        3: bench.sizes((8, 12), (20, 28, 40, 56), (70,)),
-    }
+    coarse = {2: (16, 32), 3: (8, 12)}
+    sizes = coarse if report.coarse else {2: (64, 128, 256), 3: (20, 28, 40, 56)}
     for dimension, cells in sizes.items():
         run("ratio", str(dimension), "8")  # compiles the forms, whose memory would count
         for n in cells:
@@ -66,7 +50,7 @@ def against_one_solve(bench: Bench) -> None:
                 rows.append({"dimension": dimension, "cells a unit": n, "start": name, **result})
                 if dimension == 3 and n > 40:  # once takes long enough
                     break
-    bench.report.table(
+    report.table(
         "bench-ratio",
         "Nonlinear solve against one linear elasticity solve",
         rows,
@@ -81,10 +65,10 @@ def against_one_solve(bench: Bench) -> None:
     )
 
 
-def ranks(bench: Bench) -> None:
+def ranks(report: Report) -> None:
     """One rank against two."""
     rows = []
-    sizes = {2: bench.sizes((32,), (256,), ()), 3: bench.sizes((10,), (40, 56), ())}
+    sizes = {2: (32,), 3: (10,)} if report.coarse else {2: (256,), 3: (40, 56)}
     for dimension, n in ((d, n) for d, chosen in sizes.items() for n in chosen):
         one, two = (run("ratio", str(dimension), str(n), "cold", ranks=k) for k in (1, 2))
         rows.append(
@@ -97,13 +81,13 @@ def ranks(bench: Bench) -> None:
                 "of a linear solve": one["one"] / two["one"],
             }
         )
-    bench.report.table("bench-ranks", "One rank against two, cold", rows)
+    report.table("bench-ranks", "One rank against two, cold", rows)
 
 
-def memory(bench: Bench) -> None:
+def memory(report: Report) -> None:
     """Memory of ranks."""
     held = []
-    for dimension, n in ((2, 32), (3, 8)) if bench.coarse else ((2, 128), (3, 20)):
+    for dimension, n in ((2, 32), (3, 8)) if report.coarse else ((2, 128), (3, 20)):
         first, least = np.nan, np.nan
         for count in (1, 2, 4):
             found, alone = (
@@ -123,7 +107,7 @@ def memory(bench: Bench) -> None:
                     "its over one rank": of_library / least if least > 0 else np.nan,
                 }
             )
-    bench.report.table(
+    report.table(
         "bench-memory",
         "Memory of all ranks together",
         held,
@@ -132,22 +116,22 @@ def memory(bench: Bench) -> None:
     )
 
 
-def against_getfem(bench: Bench) -> None:
+def against_getfem(report: Report) -> None:
     """Solve the same mesh, material and friction in GetFEM."""
     rows = []
-    for n in bench.sizes((16, 32), (32, 64, 128), (256,)):
+    for n in (16, 32) if report.coarse else (32, 64, 128):
         for mu in ("0.2", "0.6"):
             rows.append({"problem": "bar", "cells": n, "mu": mu, **pair("bar", str(n), mu)})
     with tempfile.TemporaryDirectory() as folder:
-        for n in bench.sizes((10,), (20, 40, 80), (160,)):
+        for n in (10,) if report.coarse else (20, 40, 80):
             mesh = str(Path(folder, f"disc-{n}.msh"))
             sizes = {"contact_size": 2.7231 / n, "contact_width": 3.4, "growth": 0.2}
             write("quarter_disc", mesh, version=2.2, size=max(0.8, 16 / n), **sizes)
             for mu in ("0.0", "0.2"):
                 rows.append({"problem": "Hertz", "cells": n, "mu": mu, **pair("hertz", mesh, mu)})
-    for n in bench.sizes((4,), (8, 12), (16,)):
+    for n in (4,) if report.coarse else (8, 12):
         rows.append({"problem": "block", "cells": n, "mu": "0.3", **pair("block", str(n), "0.3")})
-    bench.report.table(
+    report.table(
         "bench-getfem",
         "Against GetFEM: Example 7.2 with a linear material, Example 7.1, and a block in 3-D",
         rows,
@@ -157,15 +141,14 @@ def against_getfem(bench: Bench) -> None:
         "Lagrangian, r = E, and a residual of 1e-10. Its contact integrals and the nodal "
         "multipliers of this code are different discretisations of order h.",
     )
-    bench.script("peer_pair")
+    script(report, "peer_pair")
 
 
 def pair(problem: str, mesh: str, mu: str) -> Run:
     """Return our run beside GetFEM's."""
     ours = run(problem, mesh, mu)
     try:
-        words = [*command("peer_getfem"), problem, mesh, mu, "--rounds", "1"]
-        theirs = measured(words, limit=TIMEOUT)
+        theirs = measured([*command("peer_getfem"), problem, mesh, mu], limit=TIMEOUT)
     except subprocess.TimeoutExpired:
         theirs = dict.fromkeys(("steps", "converged", "assembly", "max_displacement"), np.nan)
         theirs["solve"] = np.inf
@@ -184,9 +167,9 @@ def pair(problem: str, mesh: str, mu: str) -> Run:
     }
 
 
-def phases(bench: Bench) -> None:
+def phases(report: Report) -> None:
     """Where the time goes."""
-    for dimension, n in ((2, 32), (3, 8)) if bench.coarse else ((2, 256), (3, 28)):
+    for dimension, n in ((2, 32), (3, 8)) if report.coarse else ((2, 256), (3, 28)):
         found = measured([*command("phases"), str(dimension), str(n)])
         rows = [
             {"phase": name, "linear: times": k, "seconds": one, "nonlinear: times": m, "s": whole}
@@ -194,7 +177,7 @@ def phases(bench: Bench) -> None:
             if k + m > 0
         ]
         rows.append({"phase": "all", "seconds": found["linear"], "s": found["whole"]})
-        bench.report.table(
+        report.table(
             f"bench-phases-{dimension}d",
             f"Where the time goes, {found['unknowns']} unknowns in {dimension}-D",
             rows,
@@ -202,48 +185,39 @@ def phases(bench: Bench) -> None:
         )
 
 
-def _script(name: str) -> Callable[[Bench], None]:
-    """Return the part that is a script of its own."""
-    return lambda bench: bench.script(name)
-
-
 #: Part -> its function, and the tables that it writes, in the order of the page.
-PARTS: dict[str, tuple[Callable[[Bench], None], tuple[str, ...]]] = {
+PARTS: dict[str, tuple[Callable[[Report], None], tuple[str, ...]]] = {
     "solve": (against_one_solve, ("bench-ratio",)),
-    "solvers": (_script("solvers"), ("solvers",)),
+    "solvers": (partial(script, name="solvers"), ("solvers",)),
     "phases": (phases, ("bench-phases-2d", "bench-phases-3d")),
-    "steps": (_script("steps"), ("bench-steps",)),
+    "steps": (partial(script, name="steps"), ("bench-steps",)),
     "ranks": (ranks, ("bench-ranks",)),
     "memory": (memory, ("bench-memory",)),
     "getfem": (against_getfem, ("bench-getfem", "peer-pair")),
-    "dolfinx": (_script("peer_plain"), ("peer-plain",)),
+    "dolfinx": (partial(script, name="peer_plain"), ("peer-plain",)),
 }
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the parts that are asked for, and write the page."""
     made = parser(__doc__, "bench")
-    made.add_argument("--large", action="store_true", help="two million unknowns too, 6 GB")
     made.add_argument("--parts", nargs="+", default=list(PARTS), choices=list(PARTS))
-    made.add_argument("--page", type=Path, default=Path("docs/benchmarks.md"))
-    made.add_argument("--scaling", type=Path, default=Path("docs/scaling.md"))
     given = made.parse_args(arguments)
-    np.set_printoptions(precision=3)
-    bench = Bench(Report(given.out), given.coarse, given.large)
+    report = Report(given.out, given.coarse)
     begin = time.perf_counter()
     names = [name for _, written in PARTS.values() for name in written]
     failed = []
     for part in given.parts:
         try:
-            PARTS[part][0](bench)
+            PARTS[part][0](report)
         except (RuntimeError, OSError) as error:
             print(f"part {part}: {error}", file=sys.stderr)
             failed.append(part)
         print(f"part {part}: {time.perf_counter() - begin:.0f} s since the start", flush=True)
         # Measurements stay, whatever becomes of the rest.
-        if not given.coarse or given.page != made.get_default("page"):
-            write_page(given.out, names, given.page)
-            write_memory(given.out, given.scaling)
+        if not given.coarse:
+            write_page(given.out, names, PAGE)
+            write_memory(PAGE.with_suffix(""), SCALING)
     if failed:
         sys.exit(f"not measured: {', '.join(failed)}")
 

@@ -5,13 +5,18 @@ from __future__ import annotations
 import csv
 import os
 import re
+import shutil
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from contact._compat import versions
 
-#: The table of the ranks' memory, likewise.
+DOCS = Path(__file__).parents[2] / "docs"
+#: The page of the benchmarks, and that on many ranks.
+PAGE, SCALING = DOCS / "benchmarks.md", DOCS / "scaling.md"
+
+#: The table of the ranks' memory on the page on many ranks.
 MEMORY_TABLE = re.compile(r"^\| \| unknowns \| ranks \|.*\n(?:\|.*\n)+", re.MULTILINE)
 
 INTRODUCTION = """\
@@ -25,13 +30,12 @@ are those of one process.
 
 
 def write_page(folder: Path, names: Sequence[str], page: Path) -> None:
-    """Put tables and figures of a folder together, with pictures beside the page.
+    """Put the tables of a folder together, with their numbers beside the page.
 
     Those that are not in the folder stay as the page has them.
     """
     place = page.with_suffix("")
-    place.mkdir(parents=True, exist_ok=True)
-    before = re.split(r"^(?=\*\*)", page.read_text() if page.is_file() else "", flags=re.MULTILINE)
+    before = re.split(r"^(?=\*\*)", page.read_text(), flags=re.MULTILINE)
     made = ", ".join(f"{name} {version}" for name, version in versions().items())
     measured = f"Measured on {time.strftime('%Y-%m-%d')}: {made}, {os.cpu_count()} cores.\n"
     pieces = [INTRODUCTION]
@@ -40,13 +44,11 @@ def write_page(folder: Path, names: Sequence[str], page: Path) -> None:
         if not (folder / f"{name}.md").is_file():
             pieces += [piece.rstrip("\n") + "\n" for piece in before if link in piece]
             continue
-        text = (folder / f"{name}.md").read_text().replace("](", f"]({place.name}/")
+        text = (folder / f"{name}.md").read_text()
         pieces.append(text.replace(f"`{name}.csv`", link) + f"\n{measured}")
-        for path in (folder / f"{name}.csv", folder / f"{name}.png"):
-            if path.is_file():
-                (place / path.name).write_bytes(path.read_bytes())
+        shutil.copy(folder / f"{name}.csv", place)
     page.write_text("\n".join(pieces))
-    write_summary(place)
+    (place / "summary.md").write_text(summary(place))
 
 
 def summary(folder: Path) -> str:
@@ -80,35 +82,22 @@ def summary(folder: Path) -> str:
 
 def _range(times: str, problem: str, rows: Sequence[Mapping[str, str]], key: str) -> str:
     """Return a row of the summary: the range of a column of some rows."""
-    values, sizes = (
-        [float(row[key]) for row in rows],
-        [int(row["unknowns"]) for row in rows if "unknowns" in row],
-    )
+    values = [float(row[key]) for row in rows]
+    sizes = [int(row["unknowns"]) for row in rows if "unknowns" in row]
     return f"| {times} | {problem} | {_from_to(sizes, ',')} | {_from_to(values, '.2g')} |"
 
 
 def _from_to(values: Sequence[float], form: str) -> str:
     """Return the least and the greatest of some values; a dash for none."""
-    ends = (
-        dict.fromkeys(f"{value:{form}}" for value in (min(values), max(values)))
-        if values
-        else ["—"]
-    )
-    return " to ".join(ends)
-
-
-def write_summary(folder: Path) -> None:
-    """Write the table of the page on performance beside the files that it is made from."""
-    if (folder / "bench-ratio.csv").is_file():
-        (folder / "summary.md").write_text(summary(folder))
+    if not values:
+        return "—"
+    return " to ".join(dict.fromkeys(f"{end:{form}}" for end in (min(values), max(values))))
 
 
 def write_memory(folder: Path, page: Path) -> None:
-    """Put the ranks' memory into the page on many ranks, where it has been measured."""
+    """Put the ranks' memory into the page on many ranks."""
     rows = _rows(folder / "bench-memory.csv")
     names = ("bytes an unknown", "over one rank", "linear solve", "its over one rank")
-    if not rows or not rows[0].keys() >= set(names):  # or one that was written earlier
-        return
     head = ["", "unknowns", "ranks", *names]
     lines = ["| " + " | ".join(head).strip() + " |", "|" + "---|" * len(head)]
     for row in rows:
@@ -122,8 +111,6 @@ def write_memory(folder: Path, page: Path) -> None:
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a file of numbers; none where there is none."""
-    if not path.is_file():
-        return []
+    """Return the rows of a file of numbers."""
     with path.open() as stream:
         return list(csv.DictReader(stream))

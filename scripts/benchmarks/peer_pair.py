@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 
 import meshes
 from contact import Case, build_problem, parse_case, solve
-from scripts.reporting import Report, parser
+from scripts.reporting import Report
 
 SIZES = {"lower_size": 0.08, "upper_size": 0.06}
 YOUNG, POISSON = {"upper": 1.0, "lower": 3.0}, 0.3
@@ -121,10 +121,10 @@ def compare(mu: float, finer: int) -> dict[str, Any]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write the table."""
-    options = parser(__doc__, "peer_pair").parse_args(arguments)
-    finer = (1, 2) if options.coarse else (1, 2, 4)
+    report = Report.of(__doc__, "peer_pair", arguments)
+    finer = (1, 2) if report.coarse else (1, 2, 4)
     rows = [compare(mu, n) for mu in (0.0, 0.3) for n in finer]
-    Report(options.out).table(
+    report.table(
         "peer-pair",
         "A block pressed on another one and pushed along: GetFEM and this code on the same meshes",
         rows,

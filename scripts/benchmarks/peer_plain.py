@@ -26,7 +26,7 @@ from contact.problem.problem import ContactProblem
 from forms.hencky import Log, stress
 from forms.kinematics import embed, strain
 from scripts.cases import bar
-from scripts.reporting import Report, parser
+from scripts.reporting import Report
 
 MU, LOAD = 0.5, -0.05
 
@@ -167,9 +167,9 @@ def compare(ours: Solution, seconds: float, kappa: float) -> dict[str, Any]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write the table."""
-    given = parser(__doc__, "peer_plain").parse_args(arguments)
+    report = Report.of(__doc__, "peer_plain", arguments)
     rows = []
-    for n in (8,) if given.coarse else (32, 64):
+    for n in (8,) if report.coarse else (32, 64):
         case = bar(n, LOAD, 1.0, f"friction.mu={MU}")
         problem = build_problem(case)
         solve(problem, case.solver)  # its forms are compiled
@@ -177,9 +177,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         begin = time.process_time()
         ours = solve(problem, case.solver)
         seconds = time.process_time() - begin
-        for kappa in PENALTIES[1:3] if given.coarse else PENALTIES:
+        for kappa in PENALTIES[1:3] if report.coarse else PENALTIES:
             rows.append({"cells a unit": n, **compare(ours, seconds, kappa)})
-    Report(given.out).table(
+    report.table(
         "peer-plain",
         "Plain dolfinx with a penalty beside this code, on the same meshes",
         rows,

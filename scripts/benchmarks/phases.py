@@ -1,8 +1,8 @@
 """Where the time of a nonlinear solve goes, beside one linear solve on the same mesh.
 
 ``python3 -m scripts.benchmarks.phases DIM N [cold]``: seconds of this process by phase, with how
-often each has been gone through; cold: without coarser meshes. Calls alone that the profiler sees
-are measured: a phase is a function of the program. The last line is the same as JSON.
+often each has been gone through, as JSON; cold: without coarser meshes. Calls alone that the
+profiler sees are measured: a phase is a function of the program.
 """
 
 from __future__ import annotations
@@ -15,14 +15,8 @@ import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from contact import build_problem
-from scripts.benchmarks.bench_one import (
-    one_linear_solve,
-    problem_case,
-    solved,
-    unknowns,
-    warm,
-)
+from contact import build_problem, solve
+from scripts.benchmarks.bench_one import one_linear_solve, problem_case, solved, unknowns
 
 #: Phase -> the end of the file's name, and the function. None of them calls another one, but that a
 #: factorisation for a Schur complement is a set-up too.
@@ -58,7 +52,7 @@ def profiled(action: Callable[[], Result]) -> tuple[Result, float, dict[str, tup
 def measure(dimension: int, n: int, start: str = "") -> dict[str, Any]:
     """Measure a nonlinear solve and one linear solve."""
     case = problem_case(dimension, n)
-    warm(case, lambda: problem_case(dimension, 4))
+    solve(build_problem(problem_case(dimension, 4)), case.solver)  # compiles the forms
     problem = build_problem(case)
 
     _, one, linear = profiled(lambda: one_linear_solve(problem))
@@ -68,10 +62,6 @@ def measure(dimension: int, n: int, start: str = "") -> dict[str, Any]:
     nothing = (0, 0.0)
     return {
         "unknowns": unknowns(problem),
-        "converged": solution.converged,
-        "steps": solution.counters.linear_solves,
-        "iterations": solution.counters.linear_iterations,
-        "set-ups": solution.counters.factorizations,
         "phases": {p: (*linear.get(p, nothing), *newton.get(p, nothing)) for p in PHASES},
         "linear": one,
         "whole": whole,
@@ -79,16 +69,9 @@ def measure(dimension: int, n: int, start: str = "") -> dict[str, Any]:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the measurements."""
     dimension, n, *start = sys.argv[1:]
-    found = measure(int(dimension), int(n), *start)
-    print({key: found[key] for key in ("unknowns", "converged", "steps", "iterations", "set-ups")})
-    print(f"{'':36} {'linear':>14} {'nonlinear':>14}")
-    for phase, (count, seconds, times, longer) in found["phases"].items():
-        print(f"{phase:36} {count:5d} {seconds:8.2f} {times:5d} {longer:8.2f}")
-    print(f"{'all':36} {found['linear']:14.2f} {found['whole']:14.2f}")
-    print(f"{'in linear solves':36} {1:14} {found['whole'] / found['linear']:14.2f}")
-    print(json.dumps(found))
+    print(json.dumps(measure(int(dimension), int(n), *start)))
 
 
 if __name__ == "__main__":

@@ -13,6 +13,9 @@ from typing import Any
 
 Run = dict[str, Any]
 
+#: As `make test` has it: one thread a rank, and ranks that wait give way.
+ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+
 
 def command(script: str) -> list[str]:
     """Return how a script of this folder is started."""
@@ -43,8 +46,7 @@ def started(
     words: Sequence[str], ranks: int = 1, limit: float | None = None, **variables: str
 ) -> str:
     """Return the output of a process, within a limit (seconds), with environment variables."""
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
-    environment |= variables
+    environment = {**os.environ, **ENVIRONMENT, **variables}
     done = subprocess.run(
         [*launcher(ranks), *words], env=environment, capture_output=True, text=True, timeout=limit
     )

@@ -15,7 +15,6 @@ import argparse
 import json
 import time
 import tracemalloc
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -42,9 +41,9 @@ GAP, TIGHT = 1e-3, 1e-11
 
 
 class Counted(MPI.Intracomm):
-    """A communicator that counts the bytes that this rank receives, and the calls."""
+    """A communicator that counts the bytes that this rank receives."""
 
-    received: ClassVar[Counter[str]] = Counter()
+    received: ClassVar[int] = 0
 
 
 def _counting(name: str) -> Any:
@@ -54,8 +53,7 @@ def _counting(name: str) -> Any:
         found = plain(self, *given, **more)
         here = given[0] if name == "Irecv" else given[1] if name[0].isupper() else found
         if name != "Irecv" or given[1] != self.rank:
-            self.received["bytes"] += _size(here)
-            self.received["calls"] += 1
+            Counted.received += _size(here)
         return found
 
     return counted
@@ -168,39 +166,33 @@ def outputs(problem: ContactProblem, n: int, bodies: int) -> dict[str, Callable[
 def measure(comm: MPI.Intracomm, n: int, bodies: int) -> dict[str, Any]:
     """Return the counts: the most of any rank, but for bytes received, the sum. Collective."""
     whole = Domain.comm
-    Domain.comm = property(lambda domain: Counted(whole.fget(domain)))  # type: ignore[assignment]
-    Counted.received.clear()
+    Domain.comm = property(lambda domain: Counted(whole.fget(domain)))
+    Counted.received = 0
     tracemalloc.start()
-    begin = time.perf_counter()
     try:
         problem = problem_of(comm, n, bodies)
-        made = time.perf_counter() - begin
         evaluate(problem, problem.start())
-        peak = tracemalloc.get_traced_memory()[1]
-        received, calls = Counted.received["bytes"], Counted.received["calls"]
-        stages: dict[str, Any] = {}
+        peak, received = tracemalloc.get_traced_memory()[1], Counted.received
+        stages = {}
         for name, do in outputs(problem, n, bodies).items():
-            before, here = Counted.received["bytes"], tracemalloc.get_traced_memory()[0]
+            before, here = Counted.received, tracemalloc.get_traced_memory()[0]
             tracemalloc.reset_peak()
             do()
             most = comm.allreduce(tracemalloc.get_traced_memory()[1] - here, op=MPI.MAX)
-            gone = comm.allreduce(Counted.received["bytes"] - before, op=MPI.SUM)
+            gone = comm.allreduce(Counted.received - before, op=MPI.SUM)
             stages |= {name: most, f"{name}, received": gone}
     finally:
         tracemalloc.stop()
-        Domain.comm = whole  # type: ignore[method-assign]
-    found: dict[str, Any] = {
+        Domain.comm = whole
+    return {
         "ranks": comm.size,
         "unknowns": problem.body.layout.unknowns,
         "contact nodes": problem.nodes.size,
         "python": comm.allreduce(peak, op=MPI.MAX),
         "coupling": comm.allreduce(held(problem), op=MPI.MAX),
         "received": comm.allreduce(received, op=MPI.SUM),
-        "calls": comm.allreduce(calls, op=MPI.MAX),
         **stages,
-        "seconds": made,
     }
-    return found
 
 
 def timed(comm: MPI.Intracomm, n: int, bodies: int, length: int) -> dict[str, Any]:

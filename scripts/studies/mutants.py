@@ -1,8 +1,8 @@
 """Mutants: errors of one line in the sources, each of which the core tests have to find.
 
-`python3 -m scripts.studies.mutants [--out DIR] [--only NAME ...] [--ranks N ...]`.
-Each is made in a copy of the tree, whose core tests run there until the first one fails, likely
-ones first. The status is 1 if a mutant survives.
+`python3 -m scripts.studies.mutants [--out DIR] [--only NAME ...]`. Each is made in a copy of the
+tree, whose core tests run there until the first one fails, likely ones first. The status is 1 if a
+mutant survives.
 """
 
 from __future__ import annotations
@@ -16,26 +16,19 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 
 from contact.errors import InputError
-from scripts.benchmarks.processes import launcher
+from scripts.benchmarks.processes import ENVIRONMENT, launcher
 from scripts.reporting import Report, append, empty, parser
 
 ROOT = Path(__file__).parents[2]
-
-#: Folders of the tree that a copy goes without.
-LEFT_OUT = frozenset((".git", "build", "results"))
 
 #: Seconds that the tests on some ranks may take: a mutant that hangs is found by that.
 LIMIT = 1200
 
 #: Status of pytest without any test, and of `timeout` where it ends a command.
 NO_TESTS, TIMEOUT = 5, 124
-
-#: As `make test` has it: one thread a rank, and ranks that wait give way.
-ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
 
 #: A test that fails, as pytest's summary names it.
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+::\S+)", re.M)
@@ -272,20 +265,19 @@ def copied(into: Path) -> Path:
     """Return a copy of the tree in a folder."""
 
     def left_out(folder: str, names: list[str]) -> set[str]:
-        return {"__pycache__"} | (LEFT_OUT if Path(folder) == ROOT else set())
+        return {"__pycache__", *([".git", "build", "results"] if Path(folder) == ROOT else [])}
 
     return shutil.copytree(ROOT, into / "tree", symlinks=True, ignore=left_out)
 
 
-def core_files(tree: Path, mutant: Mutant) -> tuple[list[str], list[str]]:
-    """Return the files with core tests: those near a mutant, and all others."""
+def core_files(tree: Path, mutant: Mutant) -> list[str]:
+    """Return the files with core tests, those near a mutant first."""
     files = [
         str(path.relative_to(tree))
         for path in sorted((tree / "tests").rglob("test_*.py"))
         if "mark.core" in path.read_text()
     ]
-    near = [file for file in files if file.startswith(mutant.near)]
-    return near, [file for file in files if file not in near]
+    return sorted(files, key=lambda file: not file.startswith(mutant.near))
 
 
 def found_by(tree: Path, files: Sequence[str], ranks: int) -> str:
@@ -313,21 +305,17 @@ def found_by(tree: Path, files: Sequence[str], ranks: int) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make the table of mutants."""
     names = {mutant.name: mutant for mutant in MUTANTS}
-    given = parser(__doc__ or "", "mutants")
+    given = parser(__doc__, "mutants")
     given.add_argument("--only", nargs="+", choices=names, default=[*names], metavar="NAME")
-    given.add_argument("--ranks", nargs="+", type=int, default=[1, 2, 3], metavar="N")
     options = given.parse_args(arguments)
     columns = empty("mutant", "breaks", "found by", "ranks", "s")
     for name in options.only:
         mutant, began, found = names[name], time.perf_counter(), ""
         with tempfile.TemporaryDirectory() as folder:
             tree = copied(Path(folder))
-            try:
-                mutant.apply(tree)
-            except InputError as error:
-                given.error(error.words)
-            order = sorted(options.ranks, key=lambda n: (n != mutant.ranks, n))
-            for ranks, files in product(order, core_files(tree, mutant)):
+            mutant.apply(tree)
+            files = core_files(tree, mutant)
+            for ranks in sorted((1, 2, 3), key=lambda n: n != mutant.ranks):
                 found = found_by(tree, files, ranks)
                 if found:
                     break
