@@ -72,7 +72,7 @@ class Report:
         """Print a table and write it."""
         if MPI.COMM_WORLD.rank > 0:
             return
-        columns = given if isinstance(given, Mapping) else _columns(given)
+        columns = _columns(given)
         self._csv(name, columns)
         rows = [[text(value) for value in row] for row in zip(*columns.values(), strict=True)]
         lines = [list(columns), *rows]
@@ -82,7 +82,8 @@ class Report:
             print("  ".join(cell.rjust(w) for cell, w in zip(line, widths, strict=True)))
         if note:
             print(note)
-        body = [f"| {' | '.join(line)} |" for line in _escaped(lines)]
+        escaped = ([cell.replace("|", "\\|") for cell in line] for line in lines)
+        body = [f"| {' | '.join(line)} |" for line in escaped]
         body.insert(1, "|" + " --- |" * len(columns))
         self._fragment(name, caption, "\n".join(body), note)
 
@@ -108,10 +109,10 @@ class Report:
         self._csv(name, padded)
         self._fragment(name, caption, f"![{caption}]({name}.png)", note)
 
-    def numbers(self, name: str, columns: Columns) -> None:
+    def numbers(self, name: str, given: Table) -> None:
         """Write numbers that are too many for a page."""
         if MPI.COMM_WORLD.rank == 0:
-            self._csv(name, columns)
+            self._csv(name, _columns(given))
 
     def _csv(self, name: str, columns: Columns) -> None:
         self.out.mkdir(parents=True, exist_ok=True)
@@ -125,9 +126,11 @@ class Report:
         (self.out / f"{name}.md").write_text("\n\n".join(parts) + "\n")
 
 
-def _columns(rows: Sequence[Mapping[str, Any]]) -> Columns:
-    """Return rows as columns, those of the first row; None where another has no value."""
-    return {key: [row.get(key) for row in rows] for key in rows[0]}
+def _columns(given: Table) -> Columns:
+    """Return a table as columns, those of its first row; None where another has no value."""
+    if isinstance(given, Mapping):
+        return given
+    return {key: [row.get(key) for row in given] for key in given[0]}
 
 
 def empty(*names: str) -> dict[str, list[Any]]:
@@ -146,11 +149,6 @@ def pack(path: Path) -> None:
     with Image.open(path) as picture:
         packed = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
     packed.save(path, optimize=True, dpi=(DPI, DPI))
-
-
-def _escaped(lines: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Return cells that Markdown does not take for several."""
-    return [[cell.replace("|", "\\|") for cell in line] for line in lines]
 
 
 def text(value: Any) -> str:

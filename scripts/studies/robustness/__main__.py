@@ -22,10 +22,9 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import InputError, Solution, build_problem, solve
-from contact.case.file import to_toml
 from contact.methods.options import OPTIONS, with_method
 from contact.writing import write_outputs
-from scripts.reporting import Report, append, empty, parser
+from scripts.reporting import Report, parser
 from scripts.studies.robustness.check import recheck
 from scripts.studies.robustness.problems import KINDS, Problem, problems
 
@@ -37,16 +36,6 @@ SMALL = 1e-6
 AGREE = 1e-7
 #: Notes on steps of Newton's method itself.
 OWN = "chord step", "tangent", "rejected", "initial guess"
-#: Captions of the tables.
-CAPTIONS = {
-    "plain": "Problems like those of the thesis",
-    "hard": "Bodies that bend, stick, stretch and harden",
-    "cells": "Cells of all shapes",
-    "bodies": "Several bodies, checked by an independent assembly",
-    "held": "Bodies that friction alone holds",
-    "plastic": "Evolutions of metals, checked by their energies",
-    "pairs": "Blocks on each other",
-}
 
 
 def along_normal(solution: Solution) -> float:
@@ -84,18 +73,15 @@ def solved(
 ) -> tuple[dict[str, Any], Solution | None]:
     """Solve a problem; return its row, and the solution unless it is refused. Collective."""
     begin, case = time.perf_counter(), problem.case
-    row: dict[str, Any] = {
-        "problem": problem.name, "method": method, "end": "refused", "solves": 0, "dense": 0,
-        "seconds": 0.0, "why": "", "difference": 0.0, "critical": 0.0, "steps": 0, "energies": 0.0,
-    }  # fmt: skip
+    row = {"problem": problem.name, "method": method, "end": "refused", "solves": 0}
     alone = problem.mesh is not None or problem.domain is not None
     comm = MPI.COMM_SELF if alone else MPI.COMM_WORLD
     try:
         given = case if case.evolution else build_problem(case, comm, domain=problem.domain)
         solution = solve(given, with_method(case.solver, OPTIONS[method]), comm=comm)
     except InputError as error:
-        return row | {"seconds": round(time.perf_counter() - begin, 2), "why": str(error)}, None
-    steps, counters = max(1, len(solution.steps)), solution.counters
+        seconds = round(time.perf_counter() - begin, 2)
+        return row | {"seconds": seconds, "why": str(error), "difference": 0.0}, None
     end, why = "right", ", ".join(sorted(_fallbacks(solution)))
     if not solution.converged:
         end, why = "not converged", solution.outcome.reason
@@ -103,14 +89,10 @@ def solved(
         end, why = "false", ", ".join(f"{k} {v:.1e}" for k, v in wrong.items())
     return row | {
         "end": end,
-        "solves": -(-counters.linear_solves // steps),
-        "dense": -(-counters.contact_solves // steps),
+        "solves": -(-solution.counters.linear_solves // max(1, len(solution.steps))),
         "seconds": round(time.perf_counter() - begin, 2),
         "why": why,
         "difference": _difference(solution, first or solution),
-        "critical": solution.critical_factor,
-        "steps": steps,
-        "energies": energies(solution),
     }, solution
 
 
@@ -131,28 +113,32 @@ def _difference(solution: Solution, other: Solution) -> float:
     return float(sizes[0] / (sizes[1] or 1.0))
 
 
-def table(rows: Mapping[str, list[Any]], methods: Sequence[str]) -> dict[str, list[Any]]:
+def table(rows: Sequence[Mapping[str, Any]], methods: Sequence[str]) -> list[dict[str, Any]]:
     """Count by family and method."""
-    others = [end for end in ("not converged", "refused", "false") if end in rows["end"]]
-    compared = ["method", "largest difference"] if len(methods) > 1 else []
-    solves = "median solves", "most solves"
-    made = empty(
-        "family", *compared[:1], "problems", "right", *others, *solves, *compared[1:], "fallbacks"
-    )
-    family = np.array([name.rsplit("-", 1)[0] for name in rows["problem"]])
-    method, end, why = (np.array(rows[name]) for name in ("method", "end", "why"))
-    count, difference = np.array(rows["solves"]), np.array(rows["difference"])
-    for name in dict.fromkeys(family.tolist()):
-        for way in methods:
-            chosen = (family == name) & (method == way)
-            right = chosen & (end == "right")
-            ends = chosen.sum(), right.sum(), *((end[chosen] == word).sum() for word in others)
-            most = (difference[right].max(initial=0.0),) if compared else ()
-            taken = Counter(word for words in why[right] for word in words.split(", ") if word)
-            words = ", ".join(f"{word} {n}" for word, n in taken.most_common()) or "none"
-            of_solves = int(np.median(count[chosen])), int(count[chosen].max())
-            named = (way,) if compared else ()
-            append(made, name, *named, *map(int, ends), *of_solves, *most, words)
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault((row["problem"].rsplit("-", 1)[0], row["method"]), []).append(row)
+    ends = {row["end"] for row in rows}
+    others = [end for end in ("not converged", "refused", "false") if end in ends]
+    made = []
+    for (family, method), group in groups.items():
+        right = [row for row in group if row["end"] == "right"]
+        solves = [row["solves"] for row in group]
+        taken = Counter(word for row in right for word in row["why"].split(", ") if word)
+        line = {
+            "family": family,
+            "method": method,
+            "problems": len(group),
+            "right": len(right),
+            **{end: sum(row["end"] == end for row in group) for end in others},
+            "median solves": int(np.median(solves)),
+            "most solves": max(solves),
+            "largest difference": max((row["difference"] for row in right), default=0.0),
+            "fallbacks": ", ".join(f"{word} {n}" for word, n in taken.most_common()) or "none",
+        }
+        if len(methods) == 1:
+            del line["method"], line["largest difference"]
+        made.append(line)
     return made
 
 
@@ -173,29 +159,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 row, solution = solved(problem, method, first, Path(scratch, problem.name))
                 first = first or solution
                 found.append(row)
-                end, apart = row["end"], not row["difference"] <= AGREE
-                if end != "right" or row["why"] or apart or row["critical"] <= 1:
+                if row["end"] != "right" or row["why"] or not row["difference"] <= AGREE:
                     if MPI.COMM_WORLD.rank == 0:
                         print(*row.values(), flush=True)
-                if end != "right" and problem.mesh:
-                    _keep(problem, Path(scratch, "body.msh"), given.out / problem.name)
     if not found:
         command.error(f"--only {given.only}: no such problem of this kind")
-    rows = {key: [row[key] for row in found] for key in found[0]}
-    name, caption = given.kind, CAPTIONS[given.kind]
+    name, caption = given.kind, KINDS[given.kind].caption
     if given.seed is not None:
         name, caption = f"{name}-{given.seed}", f"{caption}, drawn anew"
     report = Report(given.out)
-    report.numbers(f"{name}-problems", rows)
-    report.table(name, caption, table(rows, given.methods))
-    return 1 if "false" in rows["end"] else 0
-
-
-def _keep(problem: Problem, mesh: Path, folder: Path) -> None:
-    """Keep the files of a problem that is not solved."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "body.msh").write_bytes(mesh.read_bytes())
-    (folder / "case.toml").write_text(to_toml(problem.case).replace(str(mesh), "body.msh"))
+    report.numbers(f"{name}-problems", found)
+    report.table(name, caption, table(found, given.methods))
+    return int(any(row["end"] == "false" for row in found))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,9 @@
 """Which problems need each device of solver and linear algebra: one of them off at a time.
 
-`make ablation ARGS="[--out DIR] [--coarse] [--every K] [--devices NAME ..] [--only NAME]"`.
-Problems are the plain and the hard ones, and Example 8.4 with a steep ramp; --coarse takes a tenth,
---every K one of K. A device whose row shows no problem, neither failed nor slow, is to go
-(CONTRIBUTING.md). Some have a problem of their own. Slow is 1.5 times as long; on one of its own
-a device of linear algebra is needed where it saves a tenth.
+`make ablation ARGS="[--out DIR] [--coarse] [--devices NAME ..]"`. Problems are the plain and the
+hard ones, and Example 8.4 with a steep ramp; --coarse takes a tenth. A device whose row shows no
+problem, neither failed nor slow, is to go (CONTRIBUTING.md). Some have a problem of their own. Slow
+is 1.5 times as long; on one of its own a device of linear algebra is needed where it saves a tenth.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -273,20 +271,15 @@ def run(problem: Problem, options: NewtonOptions) -> tuple[Solution, float]:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Solve all problems with all devices, then with one of them off at a time."""
     command = parser(__doc__, "ablation")
-    command.add_argument("--every", type=int, default=1, metavar="K", help="one of K problems")
     command.add_argument("--devices", nargs="+", default=[""], help="parts of their names")
-    command.add_argument("--only", help="a family, or one problem such as bar-7")
     given = command.parse_args(arguments)
     chosen = {
         name: device
         for name, device in (DEVICES | LINEAR).items()
         if any(part in name for part in given.devices)
     }
-    common: list[Problem] = []
-    for kind in ("plain", "hard"):
-        common += islice(problems(kind, given.only, given.coarse), 0, None, given.every)
-    if given.only is None:
-        common.append(Problem("compliance-8-4", {}, steep()))
+    common = [one for kind in ("plain", "hard") for one in problems(kind, coarse=given.coarse)]
+    common.append(Problem("compliance-8-4", {}, steep()))
     alone = {name: own(name) for name in {device.own for device in chosen.values()} - {""}}
     for problem in alone.values():
         run(problem, NewtonOptions())  # loads its forms

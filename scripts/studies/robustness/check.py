@@ -6,7 +6,6 @@ from `fields.vtu`, and the laws are looked at in `contact.csv`. Of bodies whose 
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -118,14 +117,15 @@ def _listed(value: Any) -> Sequence[Any]:
     return value if isinstance(value, list | tuple) else [value]
 
 
-def _rows(path: Path) -> list[dict[str, Any]]:
-    with path.open(newline="") as file:
-        return [dict(row) for row in csv.DictReader(file)]
+def _rows(path: Path) -> Any:
+    """Return a table; its columns by their names."""
+    found = np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="utf-8")
+    return np.atleast_1d(found)
 
 
-def _column(rows: Sequence[Tables], *names: str) -> Array:
-    found = np.array([[float(row[name]) for name in names] for row in rows]).reshape(-1, len(names))
-    return found[:, 0] if len(names) == 1 else found
+def _columns(rows: Any, *names: str) -> Array:
+    """Return columns side by side, shape (rows, names)."""
+    return np.stack([np.asarray(rows[name], dtype=float) for name in names], axis=1)
 
 
 def _displacement(mesh: Mesh, path: Path) -> Array:
@@ -161,7 +161,7 @@ def recheck(mesh: Mesh, tables: Tables, folder: Path) -> dict[str, float]:
     """
     steps = _steps(folder)
     last = _rows(folder / "contact.csv")
-    table = _rows(folder / "contact-steps.csv") if len(steps) > 1 else []
+    table = _rows(folder / "contact-steps.csv") if len(steps) > 1 else None
     worst: dict[str, float] = {}
     before = np.zeros(len(last))
     moved = max(float(np.abs(_displacement(mesh, path)).max()) for _, path in steps)
@@ -169,24 +169,22 @@ def recheck(mesh: Mesh, tables: Tables, folder: Path) -> dict[str, float]:
     # Displacements are known to their rounding, and forces to that of stresses: 1e-13 E |u|.
     least = max(1e-7 * young * moved, 1e-300)
     for time, path in steps:
-        rows = [row for row in table if float(row["t"]) == time] if table else last
+        rows = last if table is None else table[table["t"] == time]
         found = _laws(tables, rows, before, float(np.ptp(mesh.points)), least)
-        before = _column(rows, "u_t")
+        before = rows["u_t"]
         if path == steps[-1][1] or not any("against" in entry for entry in tables["contact"]):
             found |= _balance(mesh, tables, folder, rows, path, least)
         worst = {name: max(value, worst.get(name, 0.0)) for name, value in found.items()}
     return worst
 
 
-def _laws(
-    tables: Tables, rows: Sequence[Tables], before: Array, size: float, least: float
-) -> dict[str, float]:
+def _laws(tables: Tables, rows: Any, before: Array, size: float, least: float) -> dict[str, float]:
     """Return the errors of Signorini's and Coulomb's laws."""
     names = "pressure", "tau", "bound", "gap", "u_n", "u_t"
-    pressure, tau, bound, gap, u_n, u_t = _column(rows, *names).T
-    status = np.array([row["status"] for row in rows])
+    pressure, tau, bound, gap, u_n, u_t = _columns(rows, *names).T
     entries = {_listed(entry["on"])[0]: entry for entry in tables["contact"]}
-    entry = [entries[row["on"]] if "on" in row else tables["contact"][0] for row in rows]
+    first = [next(iter(entries))] * len(rows)  # the only one, where there is no column
+    entry = [entries[on] for on in (rows["on"] if "on" in rows.dtype.names else first)]
     mu = np.array([float(one.get("friction", {}).get("mu", 0.0)) for one in entry])
     names = "layer", "stiffness", "limit"
     deep, stiffness, limit = np.array([[one.get(name, 0.0) for name in names] for one in entry]).T
@@ -199,7 +197,7 @@ def _laws(
     # A node that slides does so along its friction stress; any other does not slide.
     back = np.where(slides, np.minimum(slip * np.sign(tau), 0.0) * (mu * pressure > 0), slip)
     back = np.where(pressure > 1e-6 * scale, back, 0.0)
-    wrong = (status == "open") & (pressure > 1e-6 * scale) & (layer == 0)
+    wrong = (rows["status"] == "open") & (pressure > 1e-6 * scale) & (layer == 0)
     over = max(np.max(np.abs(tau) - mu * pressure), np.max(np.abs(bound - mu * pressure)), 0.0)
     return {
         "tension": -min(rigid.min(), 0.0) / scale,
@@ -212,7 +210,7 @@ def _laws(
 
 
 def _balance(
-    mesh: Mesh, tables: Tables, folder: Path, rows: Sequence[Tables], path: Path, least: float
+    mesh: Mesh, tables: Tables, folder: Path, rows: Any, path: Path, least: float
 ) -> dict[str, float]:
     """Return the errors of nodal forces, of action and reaction, and of the reactions."""
     internal = internal_forces(mesh, tables["material"], _displacement(mesh, path))
@@ -220,14 +218,14 @@ def _balance(
     summary = json.loads((folder / "summary.json").read_text())
     surface = pyvista.read(folder / "contact.vtu")
     action, worst_turn = np.zeros_like(residual), 0.0
-    weight, pressure, tau = _column(rows, "weight", "pressure", "tau").T
-    places = _column(rows, "x", "y")
+    weight, pressure, tau = _columns(rows, "weight", "pressure", "tau").T
+    places = _columns(rows, "x", "y")
     row = np.asarray(surface.point_data["row"])
     normals = np.zeros((len(rows), 2))
     normals[row[row >= 0]] = np.asarray(surface.point_data["normal"])[row >= 0][:, :2]
     along = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
     vectors = weight[:, None] * (pressure[:, None] * normals + tau[:, None] * along)
-    on = np.array([row.get("on", "") for row in rows])
+    on = rows["on"] if "on" in rows.dtype.names else np.full(len(rows), "")
     passed, shared = np.zeros(2), list[tuple[int, int, Array]]()
     for entry in tables["contact"]:
         names = _listed(entry["on"])
@@ -247,10 +245,10 @@ def _balance(
     answered = np.zeros(2)
     if against.exists():
         for row in _rows(against):
-            nodes = mesh.nodes(row["on"])
-            far = mesh.points[nodes] - _column([row], "x", "y")
+            nodes = mesh.nodes(str(row["on"]))
+            far = mesh.points[nodes] - [row["x"], row["y"]]
             node = nodes[np.argmin(np.linalg.norm(far, axis=1))]
-            force = float(row["weight"]) * _column([row], "traction_x", "traction_y")[0]
+            force = row["weight"] * np.array([row["traction_x"], row["traction_y"]])
             answered += force
             action[node] -= force
     residual += action

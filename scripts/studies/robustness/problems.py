@@ -32,15 +32,25 @@ class Problem:
     domain: Domain | None = None
 
 
-#: Kind -> its families, and the seed, which the number of the family or of the problem follows.
-KINDS: dict[str, tuple[Families, tuple[int, ...]]] = {
-    "plain": (PLAIN, (20240229,)),
-    "hard": (HARD, (20240229, 1)),
-    "cells": (CELLS, (20240229, 2)),
-    "bodies": (BODIES, (37,)),
-    "held": (HELD, (11,)),
-    "plastic": (PLASTIC, ()),
-    "pairs": (PAIRS, ()),
+@dataclass(frozen=True)
+class Kind:
+    """A kind of problems."""
+
+    #: Of its table.
+    caption: str
+    families: Families
+    #: The seed, which the number of the family or of the problem follows.
+    key: tuple[int, ...] = ()
+
+
+KINDS = {
+    "plain": Kind("Problems like those of the thesis", PLAIN, (20240229,)),
+    "hard": Kind("Bodies that bend, stick, stretch and harden", HARD, (20240229, 1)),
+    "cells": Kind("Cells of all shapes", CELLS, (20240229, 2)),
+    "bodies": Kind("Several bodies, checked by an independent assembly", BODIES, (37,)),
+    "held": Kind("Bodies that friction alone holds", HELD, (11,)),
+    "plastic": Kind("Evolutions of metals, checked by their energies", PLASTIC),
+    "pairs": Kind("Blocks on each other", PAIRS),
 }
 
 #: Kinds whose families draw one problem after the other from one stream of random numbers.
@@ -55,10 +65,10 @@ def problems(
     folder: Path | None = None,
 ) -> Iterator[Problem]:
     """Draw problems."""
-    families, key = KINDS[kind]
+    key = KINDS[kind].key
     if seed is not None:
         key = (seed, *key[1:])
-    for number, (family, (draw, numbers)) in enumerate(families.items()):
+    for number, (family, (draw, numbers)) in enumerate(KINDS[kind].families.items()):
         if only is not None and only.rsplit("-", 1)[0] != family:
             continue
         stream = np.random.default_rng([*key, number])
