@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import inspect
 import re
-from argparse import ArgumentParser
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import is_dataclass
 from pathlib import Path
@@ -149,11 +148,5 @@ def _generators() -> Iterator[str]:
         yield f"| `{name}` | {summary} | {defaults} |"
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write the page."""
-    ArgumentParser("python3 -m scripts.case_page", description=__doc__).parse_args(arguments)
-    PAGE.write_text(page())
-
-
 if __name__ == "__main__":
-    main()
+    PAGE.write_text(page())

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from contact.io.tables import described
@@ -133,11 +132,5 @@ def _rows(file: str) -> Iterator[str]:
         yield f"| `{name}` | {quantity.unit or '—'} | {text} |"
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write the page."""
-    ArgumentParser("python3 -m scripts.output_page", description=__doc__).parse_args(arguments)
-    PAGE.write_text(page(), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    PAGE.write_text(page(), encoding="utf-8")

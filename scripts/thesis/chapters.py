@@ -13,15 +13,8 @@ class Part:
     script: str
     #: On the results page.
     heading: str
-    #: Where the script is.
-    package: str = "thesis"
     #: Name of the page, one of `PAGES`.
     page: str = "thesis-studies"
-
-    @property
-    def module(self) -> str:
-        """Return the name to import."""
-        return f"scripts.{self.package}.{self.script}"
 
 
 #: Name of a page of results -> its title.
@@ -36,42 +29,32 @@ PARTS = (
     Part(
         "setups",
         "Set-ups and constants: Figures 1.1, 1.2, 7.1, 7.3, 8.1, 8.8, Table 8.1",
-        page="thesis-mechanics",
+        "thesis-mechanics",
     ),
-    Part("hertz", "Example 7.1: Hertz's cylinder, and a sphere", page="thesis-mechanics"),
-    Part("table_7_1", "Example 7.2: Table 7.1, Algorithms 1 and 2", page="thesis-mechanics"),
-    Part(
-        "figures_mechanics", "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8", page="thesis-mechanics"
-    ),
+    Part("hertz", "Example 7.1: Hertz's cylinder, and a sphere", "thesis-mechanics"),
+    Part("table_7_1", "Example 7.2: Table 7.1, Algorithms 1 and 2", "thesis-mechanics"),
+    Part("figures_mechanics", "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8", "thesis-mechanics"),
     Part(
         "table_7_2",
         "Example 7.2: Table 7.2, the penalty method, Theorem 4.2",
-        page="thesis-mechanics",
+        "thesis-mechanics",
     ),
-    Part(
-        "convergence_mechanics",
-        "Figure 7.6 and Theorems 3.2, 4.3 and 4.5",
-        package="studies",
-        page="thesis-mechanics",
-    ),
-    Part(
-        "corner", "The singular corner of Example 7.2", package="studies", page="thesis-mechanics"
-    ),
-    Part("curved_foundations", "Curved foundations", package="studies"),
-    Part("pressure_on_axis", "Pressure on the axis", package="studies"),
-    Part("nonlocal_friction", "Non-local friction at work", package="studies"),
-    Part("tables_piezo", "Examples 8.1 and 8.2: Tables 8.2 and 8.3", page="thesis-piezo"),
-    Part("figures_piezo", "Examples 8.1 and 8.2: Figures 8.2 to 8.7", page="thesis-piezo"),
-    Part("tables_compliance", "Examples 8.3 and 8.4: Table 8.4", page="thesis-compliance"),
-    Part("stopping_8_3", "Example 8.3: the thesis's two iterations", page="thesis-compliance"),
-    Part("figures_compliance", "Examples 8.3 and 8.4: figures", page="thesis-compliance"),
+    Part("convergence_mechanics", "Figure 7.6 and Theorems 3.2, 4.3 and 4.5", "thesis-mechanics"),
+    Part("corner", "The singular corner of Example 7.2", "thesis-mechanics"),
+    Part("curved_foundations", "Curved foundations"),
+    Part("pressure_on_axis", "Pressure on the axis"),
+    Part("nonlocal_friction", "Non-local friction at work"),
+    Part("tables_piezo", "Examples 8.1 and 8.2: Tables 8.2 and 8.3", "thesis-piezo"),
+    Part("figures_piezo", "Examples 8.1 and 8.2: Figures 8.2 to 8.7", "thesis-piezo"),
+    Part("tables_compliance", "Examples 8.3 and 8.4: Table 8.4", "thesis-compliance"),
+    Part("stopping_8_3", "Example 8.3: the thesis's two iterations", "thesis-compliance"),
+    Part("figures_compliance", "Examples 8.3 and 8.4: figures", "thesis-compliance"),
     Part(
         "limit_theorem",
         "Theorems 6.3 to 6.5: limits of the compliant foundation",
-        package="studies",
-        page="thesis-compliance",
+        "thesis-compliance",
     ),
-    Part("refinement_8", "Chapter 8 on finer meshes", package="studies"),
-    Part("sensitivity", "Parameters that the thesis does not print", package="studies"),
-    Part("agreement", "Agreement of the methods", package="studies"),
+    Part("refinement_8", "Chapter 8 on finer meshes"),
+    Part("sensitivity", "Parameters that the thesis does not print"),
+    Part("agreement", "Agreement of the methods"),
 )

@@ -1,30 +1,21 @@
 """The results: a summary as docs/results.md, and tables and figures with remarks, a page a chapter.
 
-`python3 -m scripts.thesis.results_page [--page docs/results.md] [--out results] [--coarse]
-[--gather] [--only SCRIPT...]`. With --gather nothing is computed: the page is put together from
-the results of earlier runs in the folder of results. Sections that are not among --only, or of
-which nothing is left there, stay as they are on the page. Without --gather also under mpirun.
+`python3 -m scripts.thesis.results_page [--page docs/results.md] [--out results]`: the pages are put
+together from the folders that the scripts of `chapters.PARTS` have written. Sections of those that
+have none stay as they are on the page.
 """
 
 from __future__ import annotations
 
-import csv
-import importlib
+import argparse
 import re
 import shutil
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from mpi4py import MPI
-
 from contact._compat import versions
-from scripts.reporting import parser
 from scripts.thesis.chapters import PAGES, PARTS, Part
 from scripts.thesis.summary import table
-
-#: Longest table that is shown; longer ones are in their CSV file.
-MOST_ROWS = 45
 
 INTRODUCTION = """\
 # Reproduction of the thesis
@@ -114,50 +105,18 @@ CONTENTS = """\
 """
 
 
-def fragments(folder: Path) -> list[Path]:
-    """Return the pieces of a script's folder in the order in which they were made.
-
-    Markdown fragments of `reporting.Report`, and pictures and tables that have none.
-    """
-    made = sorted(folder.glob("*.md"), key=lambda path: (path.stat().st_mtime_ns, path.name))
-    told = {path.stem for path in made}
-    pictures = [path for path in sorted(folder.glob("*.png")) if path.stem not in told]
-    told |= {path.stem for path in pictures}
-    tables = [path for path in sorted(folder.glob("*.csv")) if path.stem not in told]
-    return [*made, *pictures, *tables]
-
-
 def section(part: Part, folder: Path, place: str) -> str:
-    """Return a section of the page."""
+    """Return a section of the page: a script's fragments in the order in which it made them."""
     pieces = [f"## {part.heading}\n"]
-    for path in fragments(folder):
-        if path.suffix == ".md":
-            # A picture is beside its fragment; links lead to other pages.
-            picture = f"]({path.stem}.png)"
-            text = path.read_text().replace(
-                picture, picture.replace("(", f"({place}/{part.script}/")
-            )
-            name = f"{path.stem}.csv"
-            links = f"[{name}]({place}/{part.script}/{name})"
-            if (folder / f"{path.stem}.pdf").is_file():
-                links += f", [PDF]({place}/{part.script}/{path.stem}.pdf)"
-            pieces.append(text.replace(f"`{name}`", links))
-        elif path.suffix == ".png":
-            pieces.append(f"![{path.stem}]({place}/{part.script}/{path.name})\n")
-        else:
-            pieces.append(_table(path, f"{place}/{part.script}/{path.name}"))
+    for path in sorted(folder.glob("*.md"), key=lambda path: (path.stat().st_mtime_ns, path.name)):
+        # A picture is beside its fragment; links lead to other pages.
+        picture, name = f"]({path.stem}.png)", f"{path.stem}.csv"
+        text = path.read_text().replace(picture, f"]({place}/{part.script}/{path.stem}.png)")
+        links = f"[{name}]({place}/{part.script}/{name})"
+        if (folder / f"{path.stem}.pdf").is_file():
+            links += f", [PDF]({place}/{part.script}/{path.stem}.pdf)"
+        pieces.append(text.replace(f"`{name}`", links))
     return "\n".join(pieces)
-
-
-def _table(path: Path, link: str) -> str:
-    """Return a CSV file as a table, or a link to it if it is long."""
-    with path.open() as stream:
-        rows = list(csv.reader(stream))
-    if len(rows) > MOST_ROWS:
-        return f"Numbers: [{path.name}]({link})\n"
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    lines.insert(1, "|" + " --- |" * len(rows[0]))
-    return "\n".join([f"**{path.stem}**\n", *lines]) + "\n"
 
 
 def sections(folder: Path) -> dict[str, str]:
@@ -175,13 +134,13 @@ def address(part: Part) -> str:
     return f"{part.page}.md#{anchor}"
 
 
-def gather(results: Path, page: Path, only: Sequence[str]) -> None:
-    """Write the pages, and copy pictures and numbers of some scripts beside them."""
+def gather(results: Path, page: Path) -> None:
+    """Write the pages, and copy pictures and numbers beside them."""
     place, said = page.with_suffix(""), sections(page.parent)
     written = {name: [f"# {title}\n"] for name, title in PAGES.items()}
     for part in PARTS:
         folder = results / part.script
-        if part.script not in only or not folder.is_dir():
+        if not folder.is_dir():
             nothing = f"## {part.heading}\n\nNot computed yet: `make {part.script}`.\n"
             written[part.page].append(said.get(part.heading, nothing))
             continue
@@ -207,28 +166,13 @@ def overview(results: Path, made: str) -> str:
     return "\n".join(pieces)
 
 
-def run(part: Part, folder: Path, coarse: bool) -> None:
-    """Run a script. Collective."""
-    begin = time.perf_counter()
-    flags = ["--out", str(folder), *["--coarse"] * coarse]
-    importlib.import_module(part.module).main(flags)
-    if MPI.COMM_WORLD.rank == 0:
-        print(f"\n== {part.script}: {time.perf_counter() - begin:.0f} s", flush=True)
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Compute all unless told not to, and write the page."""
-    given = parser(__doc__, "")
+    """Write the pages."""
+    given = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    given.add_argument("--out", type=Path, default=Path("results"))
     given.add_argument("--page", type=Path, default=Path("docs/results.md"))
-    given.add_argument("--gather", action="store_true", help="compute nothing")
-    names = [part.script for part in PARTS]
-    given.add_argument("--only", nargs="+", choices=names, default=names, metavar="SCRIPT")
     chosen = given.parse_args(arguments)
-    for part in PARTS:
-        if part.script in chosen.only and not chosen.gather:
-            run(part, chosen.out / part.script, chosen.coarse)
-    if MPI.COMM_WORLD.rank == 0:
-        gather(chosen.out, chosen.page, chosen.only)
+    gather(chosen.out, chosen.page)
 
 
 if __name__ == "__main__":
