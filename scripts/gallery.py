@@ -23,7 +23,7 @@ from contact import load_case, solve, write_outputs
 from contact.library.materials import find
 from scripts.cases import CASES
 from scripts.studies.half_space import HalfSpace, ball
-from scripts.studies.two_bodies import half_width
+from scripts.studies.hertz_exact import line_contact
 
 #: Where the tables and figures are.
 FOLDER = Path(__file__).parents[1] / "docs" / "examples"
@@ -44,17 +44,20 @@ class Run:
         """The contents of summary.json."""
         return dict(json.loads((self.folder / "summary.json").read_text()))
 
+    def rows(self, name: str) -> list[dict[str, str]]:
+        """Return the rows of a table."""
+        with (self.folder / name).open() as stream:
+            return list(csv.DictReader(stream))
+
     def columns(self, name: str = "contact.csv") -> dict[str, np.ndarray]:
         """Return the columns of a table that are numbers."""
-        with (self.folder / name).open() as stream:
-            rows = list(csv.DictReader(stream))
+        rows = self.rows(name)
         numbers = [key for key in rows[0] if key not in ("on", "status")]
         return {key: np.array([float(row[key] or "nan") for row in rows]) for key in numbers}
 
     def sticks(self) -> np.ndarray:
         """Return which contact nodes stick."""
-        with (self.folder / "contact.csv").open() as stream:
-            return np.array([row["status"] == "stick" for row in csv.DictReader(stream)])
+        return np.array([row["status"] == "stick" for row in self.rows("contact.csv")])
 
 
 #: Name of a quantity, its computed and its reference value.
@@ -82,7 +85,7 @@ class Example:
 
 
 def _hertz(run: Run) -> Iterator[Compared]:
-    a, p_0 = half_width(160.0, 2000.0 / (1 - 0.3**2), 8.0)
+    a, p_0 = line_contact(160.0, 2000.0 / (1 - 0.3**2), 8.0)
     table = run.columns()
     load = table["weight"] * table["pressure"]
     moment = 2 * np.sqrt(np.sum(load * table["x"] ** 2) / np.sum(load))
@@ -94,7 +97,7 @@ def _cattaneo(run: Run) -> Iterator[Compared]:
     table = run.columns()
     x, force = table["x"], float(np.sum(table["weight"] * table["pressure"]))
     share = float(np.sum(table["weight"] * table["tau"])) / (MU * force)
-    a, p_0 = half_width(force, MODULUS, RELATIVE)
+    a, p_0 = line_contact(force, MODULUS, RELATIVE)
     spacing = float(np.mean(np.diff(x[np.abs(x) < a])))
     stick = float(np.abs(x[run.sticks()]).max()) + spacing / 2
     yield "share c/a that sticks", stick / a, float(np.sqrt(1 - share))
@@ -129,7 +132,6 @@ def _plates(run: Run) -> Iterator[Compared]:
 
 def _half_space(run: Run) -> Iterator[Compared]:
     entry = find("PZT-4")
-    assert entry.coupling is not None and entry.permittivity is not None
     body = HalfSpace(entry.stiffness / 1e9, entry.coupling, entry.permittivity * 1e9)
     exact = ball(body, 1.0, 0.1, 0.0)
     yield "force", abs(run.summary["rigid"]["force"][1]), exact.force
@@ -250,11 +252,6 @@ def write_meshes(name: str, out: Path) -> None:
         with tempfile.TemporaryDirectory() as place:
             run = solved(EXAMPLES[name], Path(place), figures=False, changes=changes)
             rows.append({"cells": words, **row(run)})
-    show_meshes(name, rows, out)
-
-
-def show_meshes(name: str, rows: Sequence[dict[str, Any]], out: Path) -> None:
-    """Write the table of results on several meshes."""
     with (out / f"{name}-meshes.csv").open("w", newline="") as stream:
         writer = csv.DictWriter(stream, [*rows[0]])
         writer.writeheader()

@@ -16,6 +16,7 @@ import numpy as np
 
 from contact import Solution, build_problem
 from contact.methods.options import FixedPointOptions, Options, PenaltyOptions, with_method
+from contact.problem.residuals import evaluate
 from scripts.reporting import Report, append, empty, observed_orders, parser
 from scripts.studies.agreement_examples import TOLERANCE, Example, examples
 from scripts.studies.branches import AGREE, DISTURBANCE, SOLVES, Branches
@@ -210,7 +211,7 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
                 others,
                 *branches.size(found),
                 branches.difference(found, first).largest,
-                branches.residuals(found).largest,
+                evaluate(branches.problem, found.state).largest,
                 *held(one, found),
             )
     if columns["example"]:

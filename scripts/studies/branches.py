@@ -14,7 +14,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Outcome, Record
 from contact.problem.problem import ContactProblem
-from contact.problem.residuals import Residuals, evaluate
+from contact.problem.residuals import evaluate
 from contact.problem.state import State
 from contact.refining import has_coarser, nested_start
 from contact.results.remarks import review
@@ -113,10 +113,6 @@ class Branches:
             state, allowed = method.state, method.options.allowed
             outcome = Outcome(evaluate(self.problem, state), allowed, f"given up: {SOLVES} solves")
         return Solution(self.problem, state, outcome, method.history, method.counters, "", {})
-
-    def residuals(self, found: Solution) -> Residuals:
-        """Return the residuals of a solution, computed once more from scratch. Collective."""
-        return evaluate(self.problem, found.state)
 
     def warned(self, found: Solution) -> bool:
         """Tell whether the program warns that there may be several solutions. Collective."""

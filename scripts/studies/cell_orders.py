@@ -15,20 +15,19 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact import Body, Contact, Domain, Fixed, NewtonOptions, Sphere
+from contact import Domain
 from contact.mesh.cells import SHAPES, Shape, rule, shape_of
 from contact.mesh.domain import from_mesh
 from contact.mesh.geometry import geometry_nodes, volume_factors
 from contact.mesh.grid import SIDES, box, rectangle
-from contact.methods.newton import Newton
 from contact.problem.problem import ContactProblem
-from contact.problem.state import State
 from contact.typing import Array
 from scripts.reporting import Report, append, empty
 from scripts.studies.error_norms import DualNorm, errors
 from scripts.studies.exact_solutions import Singular
 from scripts.studies.hertz_exact import Line, Point
-from scripts.studies.lame_rings import Lame, rings
+from scripts.studies.lame_rings import LAME, on_a_shaft, rings
+from tests.problems.mechanics import state_of
 from tests.problems.meshes import assembled, midpoints
 
 #: Geometry and displacements: their degrees.
@@ -113,29 +112,12 @@ def l2_error(
     return float(np.sqrt(off / whole))
 
 
-def _root_like(place: float) -> tuple[Any, Callable[[Array], Array], Callable[[Array], Array]]:
-    known = Singular(x0=place)
-    return (
-        known,
-        lambda x: np.stack([known.numpy(i, x.T) for i in range(2)]),
-        lambda x: known.pressure(x[:, 0]),
-    )
-
-
-def _hertz(kind: type[Line] | type[Point]) -> Callable[[float], Any]:
-    def at(place: float) -> tuple[Any, Callable[[Array], Array], Callable[[Array], Array]]:
-        known = kind(place)
-        return known, known.displacement, known.pressure
-
-    return at
-
-
-#: Name -> from where contact ends to problem, displacement and pressure; the dimension; the height
-#: from which on displacements are compared, as those of the ball are not known by its rim.
+#: Name -> the solution, given where contact ends; the dimension; the height from which on
+#: displacements are compared, as those of the ball are not known by its rim.
 KNOWN: dict[str, tuple[Callable[[float], Any], int, float]] = {
-    "Hertz, cylinder": (_hertz(Line), 2, 0.0),
-    "Hertz, ball": (_hertz(Point), 3, 0.25),
-    "root-like": (_root_like, 2, 0.0),
+    "Hertz, cylinder": (Line, 2, 0.0),
+    "Hertz, ball": (Point, 3, 0.25),
+    "root-like": (lambda x0: Singular(x0=x0), 2, 0.0),
 }
 
 #: Cells along an edge, by dimension and degree of the displacements.
@@ -146,30 +128,19 @@ CELLS = {(2, 1): (8, 16, 32, 64), (2, 2): (8, 16, 32, 64), (3, 1): (4, 8, 16), (
 PLACES = (1 / 6, 1 / 2, 5 / 6)
 
 
-def solved(problem: ContactProblem, tolerance: float = 1e-10) -> State:
-    """Return the solution."""
-    state, outcome = Newton(problem, NewtonOptions(tolerance=tolerance)).solve()
-    if not outcome.converged:
-        raise RuntimeError(outcome.reason)
-    return state
-
-
 def places(n: int) -> list[float]:
     """Return three places where contact may end between two nodes of n."""
     return [(np.floor(0.53 * n) + part) / n for part in PLACES]
 
 
-def _squares(
-    known: tuple[Any, Any, Any], domain: Domain, degree: int, above: float
-) -> tuple[float, float, float]:
+def _squares(known: Any, domain: Domain, degree: int, above: float) -> tuple[float, float, float]:
     """Return the squares of the errors: displacements, pressures in L2, and in the dual norm."""
-    solution, displacement, pressure = known
-    problem = solution.on(domain, degree)
-    state, nodes = solved(problem), problem.nodes
-    exact = pressure(nodes.points)
+    problem = known.on(domain, degree)
+    state, nodes = state_of(problem, 1e-10), problem.nodes
+    exact = known.pressure(nodes.points)
     error, dual = state.forces.contact - exact, DualNorm(problem)
     off = nodes.norm(error) / nodes.norm(exact), dual.pressure(error) / dual.pressure(exact)
-    return l2_error(problem, state.x, displacement, above) ** 2, off[0] ** 2, off[1] ** 2
+    return l2_error(problem, state.x, known.displacement, above) ** 2, off[0] ** 2, off[1] ** 2
 
 
 def orders(report: Report) -> dict[tuple[str, str, int, int], Array]:
@@ -200,16 +171,11 @@ def orders(report: Report) -> dict[tuple[str, str, int, int], Array]:
     return found
 
 
-LAME, SINGULAR = Lame(), Singular()
+SINGULAR = Singular()
 
 
 def _ring(cell: str, order: int, degree: int, n: int) -> tuple[ContactProblem, Any]:
-    radius = 1.0 + float(LAME.displacement(np.array(1.0)))
-    fixed = [Fixed("left", [0.0, None]), Fixed("bottom", [None, 0.0])]
-    body = Body(SINGULAR.law, fixed)
-    contact = Contact("inner0", Sphere((0.0, 0.0), radius), press=True)
-    domain = rings(MPI.COMM_WORLD, cell, order, (1.0, 2.0), (n,))
-    return ContactProblem(domain, body, contact, degree=degree), LAME.ufl
+    return on_a_shaft(rings(MPI.COMM_WORLD, cell, order, (1.0, 2.0), (n,)), degree), LAME.ufl
 
 
 def _root(cell: str, order: int, degree: int, n: int) -> tuple[ContactProblem, Any]:
@@ -220,7 +186,7 @@ def _measured(make: Callable[[int], tuple[ContactProblem, Any]], n: int) -> tupl
     """Return the error in the energy norm, relative, the seconds, and the unknowns. Collective."""
     begin = time.process_time()
     problem, exact = make(n)
-    state = solved(problem)
+    state = state_of(problem, 1e-10)
     seconds = time.process_time() - begin
     norms = [errors(problem.body, state.x, other).energy for other in (exact, None)]
     return norms[0] / norms[1], seconds, problem.body.layout.unknowns

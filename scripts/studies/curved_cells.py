@@ -12,13 +12,14 @@ from collections.abc import Sequence
 import numpy as np
 from mpi4py import MPI
 
-from contact import Body, Contact, Cylinder, Domain, Fixed, Linear, Load, Sphere
+from contact import Body, Contact, Domain, Load
 from contact.mesh.cells import SHAPES
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.reporting import Report, append, empty, observed_orders
 from scripts.studies import cell_orders
-from scripts.studies.lame_rings import Lame, error, rings
+from scripts.studies.lame_rings import LAME, LAW, error, on_a_shaft, rings, supports
+from tests.problems.mechanics import state_of
 
 CAPTION = "Displacements of round bodies on straight and on curved cells"
 NOTE = (
@@ -35,33 +36,8 @@ RIM = (
     "alone. Errors are relative, in L2; orders are those from the next coarser mesh.",
 )
 
-LAME = Lame()
-LAW = Linear(LAME.young, LAME.poisson)
-
-#: Geometry and displacements: their degrees.
-ELEMENTS = ((1, 1), (1, 2), (2, 2))
-
 #: Cells across the ring, by dimension.
 CELLS = {2: (4, 8, 16), 3: (4, 8)}
-
-
-def supports(dim: int) -> list[Fixed]:
-    """Return the supports of a quarter of a ring, by symmetry."""
-    sides = [("left", 0), ("bottom", 1), ("front", 2), ("back", 2)][: 2 * dim - 2]
-    return [Fixed(part, [0.0 if i == k else None for i in range(dim)]) for part, k in sides]
-
-
-def on_a_shaft(domain: Domain, degree: int) -> ContactProblem:
-    """Press a ring on a shaft, whose radius is that at which the pressure is LAME's."""
-    dim = domain.dim
-    radius = 1.0 + float(LAME.displacement(np.array(1.0)))
-    shaft = (
-        Sphere((0.0, 0.0), radius)
-        if dim == 2
-        else Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), radius)
-    )
-    contact = Contact("inner0", shaft, press=True)
-    return ContactProblem(domain, Body(LAW, supports(dim)), contact, degree=degree)
 
 
 def under_pressure(domain: Domain, degree: int) -> ContactProblem:
@@ -79,7 +55,7 @@ def two_rings(domain: Domain, degree: int, on: str = "outer0") -> ContactProblem
 
 def solved(problem: ContactProblem) -> tuple[float, Array]:
     """Return the error of the displacements in L2, and the pressures of all ranks."""
-    state = cell_orders.solved(problem, 1e-11)
+    state = state_of(problem, 1e-11)
     size = error(problem.body.space, state.x, LAME)
     return size, problem.nodes.gather(state.forces.contact)
 
@@ -125,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, in
     ):
         for shape in SHAPES:
             counts = CELLS[shape.dim][: 2 if report.coarse else None]
-            for order, degree in ELEMENTS:
+            for order, degree in cell_orders.ELEMENTS:
                 last = None
                 for n in counts:
                     problem = problem_of(kind, shape.name, order, degree, n)

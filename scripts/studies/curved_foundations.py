@@ -46,6 +46,7 @@ from contact.methods.options import NewtonOptions
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, append, empty, solved
+from scripts.studies.hertz_exact import line_contact
 
 YOUNG, POISSON = 1000.0, 0.3
 
@@ -371,9 +372,8 @@ def hertz(h: float, degree: int) -> Array:
     sizes = f"mesh.contact_size={h}", f"space.degree={degree}", "mesh.size=0.4"
     solution = solved(load_case(CASES / "hertz-small.toml", sizes))
     values, nodes = ratios(solution, 1.0), solution.problem.nodes
-    plane, load, radius = YOUNG_HERTZ / (1 - POISSON**2), 160.0, 8.0
-    a = np.sqrt(4 * load * radius / (np.pi * plane))
-    peak, x = 2 * load / (np.pi * a), nodes.gather(nodes.points[:, 0])
+    a, peak = line_contact(160.0, YOUNG_HERTZ / (1 - POISSON**2), 8.0)
+    x = nodes.gather(nodes.points[:, 0])
     inner = np.abs(x) < 0.7 * a
     values[0] /= peak * np.sqrt(np.maximum(1 - (x / a) ** 2, 1e-9))
     return values[:, inner]
@@ -398,11 +398,12 @@ def series(coarse: bool) -> Iterator[tuple[str, str, tuple[float, ...], Measured
             flat = kind != "3-D" and name in ("cylinder", "cone")
             if not flat and (kind == "3-D" or name != "triangles"):
                 sizes = SPACE[:1] if kind == "3-D" and coarse else SPACE
-                yield name, kind, sizes if kind == "3-D" else PLANE, partial(_of, name, kind)
-
-
-def _of(name: str, kind: str, h: float, degree: int, order: int = 1) -> Array:
-    return hydrostatic(name, h, degree, kind, order)
+                yield (
+                    name,
+                    kind,
+                    sizes if kind == "3-D" else PLANE,
+                    partial(hydrostatic, name, kind=kind),
+                )
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, float, int, int], Array]:

@@ -24,7 +24,8 @@ from contact.mesh.domain import Domain
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, append, empty, solved
-from scripts.studies.two_bodies import ALUMINIUM, RADIUS, STEEL, half_width, middle
+from scripts.studies.hertz_exact import line_contact
+from scripts.studies.two_bodies import ALUMINIUM, RADIUS, STEEL, middle
 
 #: Force of the whole cylinder (N/mm), and Young's moduli (N/mm^2); Poisson's ratio is 0.3.
 FORCE, MODULI = 35e3, {"cylinder": 210e3, "block": 70e3}
@@ -216,7 +217,7 @@ def half_planes(mu: float, count: int, steps: int = 1) -> tuple[float, float, fl
     modulus = 1 / (1 / STEEL + 1 / ALUMINIUM)
     c = 2 / (np.pi * modulus)
     b = 0.4 * 1.3 / 2 * (1 / MODULI["block"] - 1 / MODULI["cylinder"])
-    ends = np.linspace(-1.2, 1.2, count + 1) * half_width(FORCE, modulus, RADIUS)[0]
+    ends = np.linspace(-1.2, 1.2, count + 1) * line_contact(FORCE, modulus, RADIUS)[0]
     x, h = (ends[1:] + ends[:-1]) / 2, ends[1] - ends[0]
     offset = x[:, None] - ends
     primitive = offset * (np.log(np.abs(offset)) - 1)

@@ -7,19 +7,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from contact import Case, NewtonOptions, build_problem, load_case, parse_case, solve
-from contact.methods.newton import Newton
+from contact import Case, build_problem, load_case, parse_case, solve
 from contact.problem.problem import ContactProblem
-from contact.problem.state import State
 from contact.results.error_estimate import estimated
 from contact.results.remarks import LOCKED
+from scripts.cases import CASES
 from scripts.reporting import Report, append, empty
 from tests.problems.bar import changed
+from tests.problems.mechanics import state_of
 from tests.problems.membrane import cook
 
 LINEAR = {"material__law": "linear", "material__yield_strain": None}
@@ -31,14 +30,16 @@ LOCKING = {
     },
     "nu = 0.4999, mu = 0": {**LINEAR, "material__poisson": 0.4999, "friction__mu": 0.0},
 }
+#: Bars whose errors are looked at.
+BARS: dict[str, dict[str, Any]] = {
+    "bar with friction": {**LINEAR, "friction__mu": 0.6},
+    "bar without friction": {**LINEAR, "friction__mu": 0.0},
+    "yielding bar": {"friction__mu": 0.6, "material__yield_strain": 0.005},
+    "bar, nu = 0.4999": LOCKING["nu = 0.4999, mu = 0"],
+}
 #: The rise of Cook's membrane, P2 on 64 cells (19.43) beside the mean dilatation on as many.
 COOK = 19.43
 ELEMENTS = {"P1": (1, "standard"), "P2": (2, "standard"), "P2, mean": (2, "mean_dilatation")}
-
-
-def state_of(problem: ContactProblem) -> State:
-    """Return the solution. Collective."""
-    return Newton(problem, NewtonOptions(tolerance=1e-9)).solve(problem.start())[0]
 
 
 def bar(n: int, degree: int, element: str = "standard", **changes: Any) -> ContactProblem:
@@ -61,7 +62,6 @@ def locking(report: Report) -> None:
                 solution = solve(problem)
                 seconds = time.perf_counter() - begin
                 error = solution.error
-                assert error is not None
                 warns = any("[locking]" in text or "coarse" in text for text in solution.warnings)
                 size = solution.max_displacement
                 append(columns, name, label, n, size, seconds, error.stiffness_ratio,
@@ -101,14 +101,8 @@ def membrane(report: Report) -> None:
 def quantities(report: Report) -> None:
     """Make the table of intervals beside values on a finer mesh. Collective."""
     columns = empty("problem", "element", "unknowns", "quantity", "low", "high", "value", "inside")
-    cases: dict[str, dict[str, Any]] = {
-        "bar with friction": {**LINEAR, "friction__mu": 0.6},
-        "bar without friction": {**LINEAR, "friction__mu": 0.0},
-        "yielding bar": {"friction__mu": 0.6, "material__yield_strain": 0.005},
-        "bar, nu = 0.4999": LOCKING["nu = 0.4999, mu = 0"],
-    }
     most = {1: 1000 if report.coarse else 10_000, 2: 3000 if report.coarse else 10_000}
-    for name, changes in cases.items():
+    for name, changes in BARS.items():
         known = solve(_uniform(2, 10 * most[2], **changes)).adaptation[-1]
         for degree, unknowns in most.items():
             solution = solve(_uniform(degree, unknowns, **changes))
@@ -139,24 +133,23 @@ def per_second(report: Report) -> None:
     tip = {"on": "right", "traction": [0.0, -1e-6]}
     beam = {**LINEAR, "mesh__size": [80.0, 1.0], "mesh__parts__loaded": None, "load__0": tip,
             "contact__gap": 10.0}  # fmt: skip
-    folder = Path(__file__).parents[1] / "cases"
-    files = {"Hertz, 2-D": "hertz.toml"}
     for label, (degree, element) in ELEMENTS.items():
         space = {"space__degree": degree, "space__element": element}
         keys = [f"space.degree={degree}", f'space.element="{element}"']
         cases: list[tuple[str, Case]] = []
         for n in (8, 16) if report.coarse else (8, 16, 32):
-            friction = {**LINEAR, "friction__mu": 0.6, "mesh__cells": [4 * n, n]}
-            cases.append(("bar", parse_case(changed(**friction, **space))))
+            cells = {"mesh__cells": [4 * n, n]}
+            cases.append(
+                ("bar", parse_case(changed(**BARS["bar with friction"], **space, **cells)))
+            )
         for n in (3,) if report.coarse or degree == 2 else (3, 6):
             cells = {"mesh__cells": [80 * n, n]}
             cases.append(("beam", parse_case(changed(**beam, **space, **cells))))
-        cases += [(name, load_case(folder / file, keys)) for name, file in files.items()]
+        cases.append(("Hertz, 2-D", load_case(CASES / "hertz.toml", keys)))
         for name, case in cases:
             begin = time.perf_counter()
             solution = solve(case)
             seconds = time.perf_counter() - begin
-            assert solution.error is not None
             append(columns, name, label, solution.problem.body.layout.unknowns, seconds,
                    solution.error.relative, solution.max_displacement)  # fmt: skip
     report.table(
@@ -178,7 +171,7 @@ def adaptive(report: Report) -> None:
         rows, seconds, last = _timed(case)
         found = {"adapted": [(row["unknowns"], row["error"]) for row in rows], "uniform": []}
         for problem in uniform:
-            estimate = estimated(problem, state_of(problem)).relative
+            estimate = estimated(problem, state_of(problem, 1e-9)).relative
             found["uniform"].append((problem.body.layout.unknowns, estimate))
         needed, rates = zip(*(_fall(found[kind], error) for kind in found), strict=True)
         append(columns, name, f"P{degree}", error, *needed, *rates, len(rows),
@@ -199,7 +192,7 @@ def _adapted(
     coarse: bool,
 ) -> Iterator[tuple[str, int, float, Case, Iterator[ContactProblem]]]:
     """Give name, degree, error, case with `[mesh.adapt]`, and uniform meshes. Collective."""
-    changes = {**LINEAR, "friction__mu": 0.6}
+    changes = BARS["bar with friction"]
     for degree, asked in ((1, 0.05 if coarse else 0.004), (2, 0.02 if coarse else 5e-4)):
         tables = changed(mesh__cells=[16, 4], space__degree=degree, **changes)
         tables["mesh"]["adapt"] = {"error": asked, "max_unknowns": 400_000}

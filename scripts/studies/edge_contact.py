@@ -17,7 +17,7 @@ from contact import Body, Contact, Domain, Fixed, Friction, Motion, Plane, build
 from contact.mesh.domain import revolved
 from contact.mesh.geometry import geometry_nodes
 from contact.mesh.grid import rectangle
-from contact.mesh.transfer import carry, refined
+from contact.mesh.transfer import refined
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.error_estimate import estimated
@@ -25,8 +25,9 @@ from contact.typing import Array
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from scripts.reporting import Report, append, empty
-from scripts.studies.discretisation import state_of
+from scripts.studies.effectivity import compared
 from scripts.studies.error_norms import errors
+from tests.problems.mechanics import state_of
 
 #: Refinements of the reference about the edges: the last cells are narrower than most contacts.
 LOCAL = 8
@@ -58,7 +59,7 @@ class Edged:
             domain = refined(domain, np.flatnonzero(near).astype(np.int32))
         body = problem.body
         fine = ContactProblem(domain, body.description, problem.contacts, degree=body.degree)
-        return fine, state_of(fine)
+        return fine, state_of(fine, 1e-9)
 
 
 def edged() -> dict[str, Edged]:
@@ -174,12 +175,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             relative, effectivity = [], []
             for n in meshes:
                 problem = one.make(n, degree)
-                state = state_of(problem)
-                found = estimated(problem, state)
-                other = carry(problem.body.function(state.x), fine.body.space)
-                error = errors(fine.body, best.x, other).energy
+                state, error = compared(problem, fine, best)
                 relative.append(error / norm)
-                effectivity.append(float(np.sqrt(found.total)) / error)
+                effectivity.append(float(np.sqrt(estimated(problem, state).total)) / error)
             append(columns, name, f"P{degree}", *relative, *effectivity)
     report.table(
         "edges", "Estimated error over the error where bodies touch at edges", columns, NOTE

@@ -24,6 +24,7 @@ from forms.ops import cos, sin
 from forms.piezo import Piezo, coupling_stress, electric_displacement
 from forms.plane_stress import ACROSS, HenckyAtPoints, PlaneStressHistory
 from scripts.studies.error_norms import Errors, errors
+from scripts.studies.hertz_exact import components
 
 
 @dataclass(frozen=True)
@@ -180,13 +181,12 @@ class Singular:
             value = value - x[1] * root * ops.cos(theta / 2)
         return value / (2 * self.law.shear)
 
-    def numpy(self, i: int, points: Array) -> Array:
-        """Return a component at points of shape (n, 2)."""
-        x = points.T
+    def displacement(self, x: Array) -> Array:
+        """Return (u_x, u_y) at points (x, y), shape (2, n)."""
         # Rounding must not take nodes of y = 0 across the branch cut.
         y = np.maximum(x[1], 0.0)
         polar = np.hypot(x[0] - self.x0, y), np.arctan2(y, x[0] - self.x0)
-        return np.asarray(self.component(i, x, polar, np))
+        return np.stack([self.component(i, x, polar, np) for i in range(2)])
 
     def ufl(self, x: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
         """Return the displacement as a UFL vector."""
@@ -194,9 +194,9 @@ class Singular:
         polar = r, ufl.atan2(x[1], x[0] - self.x0)
         return ufl.as_vector([self.component(i, x, polar, ufl) for i in range(2)])
 
-    def pressure(self, x: Array) -> Array:
-        """Return the contact pressure along y = 0."""
-        return self.amplitude * np.sqrt(np.maximum(x - self.x0, 0.0))
+    def pressure(self, points: Array) -> Array:
+        """Return the contact pressure at points of y = 0, shape (n,)."""
+        return self.amplitude * np.sqrt(np.maximum(points[:, 0] - self.x0, 0.0))
 
     def problem(self, n: int, degree: int = 1) -> ContactProblem:
         """Return the problem on the unit square with n x n cells. Collective."""
@@ -204,7 +204,7 @@ class Singular:
 
     def on(self, domain: Domain, degree: int) -> ContactProblem:
         """Return the problem on another mesh of the square, with the same sides. Collective."""
-        given = [_Component(self, i) for i in range(2)]
+        given = components(self.displacement, 2)
         fixed = [Fixed(side, given) for side in ("left", "right", "top")]
         flat = GapFunction(lambda points: np.zeros(len(points)))
         return ContactProblem(domain, Body(self.law, fixed), Contact("bottom", flat), degree=degree)
@@ -212,22 +212,7 @@ class Singular:
     def errors(self, problem: ContactProblem, state: State) -> tuple[Errors, float]:
         """Return the norms of a state's error, and the largest one at the nodes. Collective."""
         body = problem.body
-        points = body.space.tabulate_dof_coordinates()[:, :2]
-        given = np.column_stack([self.numpy(i, points) for i in range(2)])
+        given = self.displacement(body.space.tabulate_dof_coordinates().T).T
         largest = np.abs(state.x.reshape(-1, 2) - given).max(initial=0.0)
         norms = errors(body, state.x, self.ufl)
         return norms, float(problem.comm.allreduce(largest, op=MPI.MAX))
-
-
-@dataclass(frozen=True)
-class _Component:
-    """A component of the displacement, as a boundary value."""
-
-    solution: Singular
-    index: int
-
-    def ufl(self, x: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
-        return self.solution.ufl(x)[self.index]
-
-    def numpy(self, points: Array) -> Array:
-        return self.solution.numpy(self.index, points)

@@ -23,6 +23,17 @@ from forms.hencky import Linear
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(60)
 
 
+def line_contact(force: float, modulus: float, radius: float) -> tuple[float, float]:
+    """Return Hertz's half width and largest pressure of a line contact: F, E*, R given."""
+    a = float(np.sqrt(4 * force * radius / (np.pi * modulus)))
+    return a, 2 * force / (np.pi * a)
+
+
+def components(displacement: Callable[[Array], Array], dim: int) -> list[Callable[[Array], Array]]:
+    """Return the components of a displacement as boundary values."""
+    return [lambda x, i=i: displacement(x)[i] for i in range(dim)]
+
+
 @dataclass(frozen=True)
 class Line:
     """The contact of a cylinder with the half plane y > 0, p = p_0 sqrt(1 - x^2/b^2)."""
@@ -67,7 +78,7 @@ class Line:
 
     def on(self, domain: Domain, degree: int) -> ContactProblem:
         """Return the problem on another mesh of that half, with the same sides. Collective."""
-        given = [_component(self.displacement, i) for i in range(2)]
+        given = components(self.displacement, 2)
         fixed = [Fixed("left", [0.0, None]), *(Fixed(side, given) for side in ("right", "top"))]
         return ContactProblem(
             domain, Body(self.law, fixed), Contact("bottom", self.gap, press=True), degree=degree
@@ -120,13 +131,9 @@ class Point:
 
     def on(self, domain: Domain, degree: int) -> ContactProblem:
         """Return the problem on a mesh of [0, 1]^3, a quarter by symmetry. Collective."""
-        given = [_component(self.displacement, i) for i in range(3)]
+        given = components(self.displacement, 3)
         fixed = [Fixed("left", [0.0, None, None]), Fixed("front", [None, 0.0, None])]
         fixed += [Fixed(side, given) for side in ("right", "back", "top")]
         return ContactProblem(
             domain, Body(self.law, fixed), Contact("bottom", self.gap, press=True), degree=degree
         )
-
-
-def _component(displacement: Callable[[Array], Array], i: int) -> Callable[[Array], Array]:
-    return lambda x: displacement(x)[i]

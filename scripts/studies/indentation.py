@@ -81,8 +81,6 @@ class Setting:
         if self.material == "thesis":
             return HalfSpace(isotropic(*THESIS.values()), *hexagonal_voigt(**COUPLING))
         entry = find(self.material)
-        assert entry.coupling is not None
-        assert entry.permittivity is not None
         sign = -np.sign(self.poling)
         return HalfSpace(entry.stiffness / 1e9, sign * entry.coupling, 1e9 * entry.permittivity)
 

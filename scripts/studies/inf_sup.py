@@ -68,10 +68,13 @@ class Mesh:
         return ContactProblem(domain, body, Contact(self.part, 0.0), degree=degree)
 
 
-def unit(cells: int, dim: int = 2) -> Domain:
-    """Return the unit square or cube."""
-    if dim == 2:
-        return rectangle(MPI.COMM_SELF, [0.0] * 2, [1.0] * 2, [cells] * 2)
+def unit(cells: int) -> Domain:
+    """Return the unit square."""
+    return rectangle(MPI.COMM_SELF, [0.0] * 2, [1.0] * 2, [cells] * 2)
+
+
+def cube(cells: int) -> Domain:
+    """Return the unit cube."""
     return box(MPI.COMM_SELF, [0.0] * 3, [1.0] * 3, [cells] * 3)
 
 
@@ -93,32 +96,18 @@ def graded(cells: int) -> Domain:
 
 SIDES = ("left", "right")
 
-#: Kinds of meshes, with the numbers of cells and the refinements for V, by degree.
+#: Cells and refinements for V, by degree, in 2-D and in 3-D.
+PLANE = {1: ((4, 8, 16), 3), 2: ((4, 8, 16), 2)}
+SPACE = {1: ((2, 3, 4), 2), 2: ((2, 3), 1)}
+
+#: Kinds of meshes.
 SERIES: dict[str, tuple[Mesh, dict[int, tuple[tuple[int, ...], int]]]] = {
-    "uniform": (
-        Mesh(unit, "bottom", ["top"]),
-        {1: ((4, 8, 16), 3), 2: ((4, 8, 16), 2)},
-    ),
-    "alternating": (
-        Mesh(alternating, "bottom", ["top"]),
-        {1: ((4, 8, 16), 3), 2: ((4, 8, 16), 2)},
-    ),
-    "graded": (
-        Mesh(graded, "contact", ["bottom", "side"]),
-        {1: ((4, 8, 16), 3), 2: ((4, 8, 16), 2)},
-    ),
-    "crosspoints": (
-        Mesh(unit, "bottom", ["top", *SIDES]),
-        {1: ((4, 8, 16), 3), 2: ((4, 8, 16), 2)},
-    ),
-    "uniform, 3-D": (
-        Mesh(lambda n: unit(n, 3), "bottom", ["top"]),
-        {1: ((2, 3, 4), 2), 2: ((2, 3), 1)},
-    ),
-    "crosspoints, 3-D": (
-        Mesh(lambda n: unit(n, 3), "bottom", ["top", *SIDES, "front", "back"]),
-        {1: ((2, 3, 4), 2), 2: ((2, 3), 1)},
-    ),
+    "uniform": (Mesh(unit, "bottom", ["top"]), PLANE),
+    "alternating": (Mesh(alternating, "bottom", ["top"]), PLANE),
+    "graded": (Mesh(graded, "contact", ["bottom", "side"]), PLANE),
+    "crosspoints": (Mesh(unit, "bottom", ["top", *SIDES]), PLANE),
+    "uniform, 3-D": (Mesh(cube, "bottom", ["top"]), SPACE),
+    "crosspoints, 3-D": (Mesh(cube, "bottom", ["top", *SIDES, "front", "back"]), SPACE),
 }
 
 

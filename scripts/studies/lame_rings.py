@@ -11,9 +11,11 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
+from contact import Body, Contact, Cylinder, Domain, Fixed, Linear, Sphere
 from contact.mesh.cells import Shape
-from contact.mesh.domain import Domain, from_mesh
+from contact.mesh.domain import from_mesh
 from contact.mesh.grid import box, rectangle
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from tests.problems.meshes import assembled, midpoints
 
@@ -57,6 +59,10 @@ class Lame:
         """Return the radial stress."""
         mean, rest = self._constants()
         return mean - rest / radius**2
+
+
+LAME = Lame()
+LAW = Linear(LAME.young, LAME.poisson)
 
 
 def rings(
@@ -109,3 +115,22 @@ def error(space: fem.FunctionSpace, x: Array, exact: Lame) -> float:
     squares = [fem.assemble_scalar(fem.form(ufl.inner(v, v) * dx)) for v in (u - known, known)]
     off, whole = mesh.comm.allreduce(np.array(squares))
     return float(np.sqrt(off / whole))
+
+
+def supports(dim: int) -> list[Fixed]:
+    """Return the supports of a quarter of a ring, by symmetry."""
+    sides = [("left", 0), ("bottom", 1), ("front", 2), ("back", 2)][: 2 * dim - 2]
+    return [Fixed(part, [0.0 if i == k else None for i in range(dim)]) for part, k in sides]
+
+
+def on_a_shaft(domain: Domain, degree: int) -> ContactProblem:
+    """Press a ring on a shaft, whose radius is that at which the pressure is LAME's."""
+    dim = domain.dim
+    radius = 1.0 + float(LAME.displacement(np.array(1.0)))
+    shaft = (
+        Sphere((0.0, 0.0), radius)
+        if dim == 2
+        else Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), radius)
+    )
+    contact = Contact("inner0", shaft, press=True)
+    return ContactProblem(domain, Body(LAW, supports(dim)), contact, degree=degree)

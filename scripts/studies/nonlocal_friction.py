@@ -89,7 +89,6 @@ def _draw(report: Report, name: str, where: str, tables: dict[str, Table | None]
     figure, axes = subplots(3, 2, size=(TWO_COLUMNS, 6.6), sharex="col")
     data: dict[str, Sequence[float]] = {}
     for label, table in tables.items():
-        assert table is not None
         # A radius up to h changes nothing: that curve lies on the one of radius 0.
         look = {"0": {"lw": 2.6, "color": "0.75"}, "h": {"lw": 0.9}}.get(label, {})
         data.setdefault("x", table["x"])

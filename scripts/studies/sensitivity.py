@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact import Solution, build_problem, solve
+from contact import build_problem, solve
 from scripts.cases import on_grid
 from scripts.reporting import Report
 
@@ -77,12 +77,6 @@ SWEEPS: Mapping[str, Sweep] = {
 }  # fmt: skip
 
 
-def run(sweep: Sweep, value: float, cells: tuple[int, int], domain: object) -> Solution:
-    """Solve with one value. Collective."""
-    case = on_grid(sweep.case, cells, "solver.method=newton", f"{sweep.key}={value}")
-    return solve(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
-
-
 def study(report: Report, name: str) -> None:
     """Tabulate contact force and pressure over one parameter. Collective."""
     sweep = SWEEPS[name]
@@ -91,7 +85,8 @@ def study(report: Report, name: str) -> None:
     rows: list[dict[str, object]] = []
     domain = None
     for value in sweep.values:
-        solution = run(sweep, value, cells, domain)
+        case = on_grid(sweep.case, cells, "solver.method=newton", f"{sweep.key}={value}")
+        solution = solve(build_problem(case, domain=domain), case.solver)
         domain, nodes = solution.problem.domain, solution.problem.nodes
         closed = nodes.sum(np.where(solution.status == "open", 0.0, 1.0 / nodes.weight))
         rows.append(

@@ -16,6 +16,7 @@ from contact.results.solution import Solution
 from scripts.cases import CASES
 from scripts.reporting import Report, append, empty, solved
 from scripts.studies.curved_foundations import ratios, two_rings
+from scripts.studies.hertz_exact import line_contact
 
 #: E/(1 - nu^2) of steel and aluminium of the cylinder on a block, radius there.
 STEEL, ALUMINIUM, RADIUS = 210e3 / 0.91, 70e3 / 0.91, 50.0
@@ -36,13 +37,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     rings(report, (0.1, 0.05) if report.coarse else (0.1, 0.05, 0.025))
 
 
-def table_of(solution: Solution) -> Table:
-    """Return the contact table."""
-    table = contact_table(solution.contact)
-    assert table is not None  # on one rank
-    return table
-
-
 def hertz(report: Report, sizes: Sequence[float]) -> None:
     """Write half width, largest pressure and stick ratio of the cylinder on a block.
 
@@ -57,7 +51,7 @@ def hertz(report: Report, sizes: Sequence[float]) -> None:
     for mu, steps, share, size in runs:
         # Lengths and pressures grow like the root of the load.
         root = np.sqrt(share)
-        a, p_0 = half_width(35e3 * share, modulus, RADIUS)
+        a, p_0 = line_contact(35e3 * share, modulus, RADIUS)
         changes = [
             f"mesh.contact_size={size * root}",
             f"mesh.contact_width={8.0 * root}",
@@ -67,7 +61,7 @@ def hertz(report: Report, sizes: Sequence[float]) -> None:
             f"load.0.traction=[0.0, '-{350.0 * share}*t']",
         ]
         solution = solved(load_case(CASES / "cylinder-on-block.toml", changes))
-        table = table_of(solution)
+        table = contact_table(solution.contact)
         force = table["weight"] * table["pressure"]
         found = 2 * np.sqrt(np.sum(force * table["x"] ** 2) / np.sum(force))
         touches = table["pressure"] > 0
@@ -126,7 +120,7 @@ def pressed(kinematics: str, degree: int, push: float, elements: float) -> Press
     }
     if not balls:
         case["fixed"].append({"on": "symmetry", "displacement": [0.0, "free"]})
-    table = table_of(solved(parse_case(case)))
+    table = contact_table(solved(parse_case(case)).contact)
     x, share = table["x"], table["weight"] * table["pressure"]
     force = float(share.sum()) * (1 if balls else 2)
     modulus, radius = YOUNG / (2 * 0.91), BALL / 2
@@ -134,7 +128,7 @@ def pressed(kinematics: str, degree: int, push: float, elements: float) -> Press
         a = (3 * force * radius / (4 * modulus)) ** (1 / 3)
         p_0, moment = 1.5 * force / (np.pi * a**2), 5 / 2
     else:
-        (a, p_0), moment = half_width(force, modulus, radius), 4.0
+        (a, p_0), moment = line_contact(force, modulus, radius), 4.0
     found = np.sqrt(moment * np.sum(share * x**2) / np.sum(share))
     return Pressed(push, force, float(found) / a, summit(table, a) / p_0, a)
 
@@ -188,12 +182,6 @@ def round_bodies(report: Report, counts: Sequence[float]) -> None:
         "computed force. The approach follows from two forces, without the effect of the cuts far "
         "from the contact.",
     )
-
-
-def half_width(force: float, modulus: float, radius: float) -> tuple[float, float]:
-    """Return Hertz's half width and largest pressure of a line contact."""
-    a = float(np.sqrt(4 * force * radius / (np.pi * modulus)))
-    return a, 2 * force / (np.pi * a)
 
 
 def rings(report: Report, sizes: Sequence[float]) -> None:

@@ -221,7 +221,6 @@ def series(report: Report, cells: tuple[int, int], values: Mapping[float, str] =
         figure, axes = subplots(size=(TWO_COLUMNS, 3.2))
         data: dict[str, Sequence[float]] = {}
         for (label, table), name in zip(tables.items(), names, strict=True):
-            assert table is not None
             data.setdefault("x", table["x"])
             data[label] = table[key]
             style = "k--" if label.startswith("P") else "-"  # dashes: the limit of the others

@@ -88,7 +88,6 @@ def compare(report: Report, tables: Mapping[str, Table | None]) -> None:
         # The first is wider: both are seen where they coincide.
         for number, width, label in ((exact, 2.4, "multipliers"), (penalised, 0.8, "penalty")):
             table = tables[number]
-            assert table is not None
             data.setdefault("x", table["x"])
             for row, key in enumerate(("pressure", "tau")):
                 axes[row, column].plot(table["x"], table[key], lw=width, label=label)

@@ -124,7 +124,6 @@ def norms(body: BodyEquilibrium) -> Callable[[Array], Array]:
     """Return the norms of u and phi in H1 (seminorms |eps|, |grad|) and in L2. Collective."""
     difference = fem.Function(body.space)
     u, phi = body.split(difference)
-    assert phi is not None
     parts = (strain(u), ufl.grad(phi), u, phi)
     forms = [fem.form(ufl.inner(part, part) * body.domain.dx) for part in parts]
 

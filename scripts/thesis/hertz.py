@@ -18,6 +18,7 @@ from contact.results.contact_nodes import contact_table
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import TWO_COLUMNS, Report, run_of, solved, subplots
+from scripts.studies.hertz_exact import line_contact
 
 
 @dataclass(frozen=True)
@@ -32,14 +33,13 @@ class Cylinder:
 
     @property
     def half_width(self) -> float:
-        """Return b = 2 sqrt(F R (1 - nu^2) / (pi E))."""
-        modulus = self.young / (1 - self.poisson**2)
-        return float(2 * np.sqrt(self.load * self.radius / (np.pi * modulus)))
+        """Return b."""
+        return line_contact(self.load, self.young / (1 - self.poisson**2), self.radius)[0]
 
     @property
     def peak(self) -> float:
-        """Return p_0 = 2 F / (pi b)."""
-        return 2 * self.load / (np.pi * self.half_width)
+        """Return p_0."""
+        return line_contact(self.load, self.young / (1 - self.poisson**2), self.radius)[1]
 
     def pressure(self, x: Array) -> Array:
         """Return p_0 sqrt(1 - x^2/b^2)."""
@@ -184,7 +184,6 @@ def run(case: Case, load: float) -> tuple[Solution, Found]:
     """Solve a case with the traction scaled to the load on the polygonal body. Collective."""
     domain = case.mesh.build(MPI.COMM_WORLD)
     first = case.load[0]
-    assert first.traction is not None
     scaled = [0.0] * (domain.dim - 1) + [-load / area(domain, "top")]
     traction = tuple(type(first.traction[0])(value) for value in scaled)
     loads = (first.model_copy(update={"traction": traction}), *case.load[1:])
@@ -265,7 +264,6 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
     figure, axes = subplots(2, 1, size=(TWO_COLUMNS, 5.2), sharex=True)
     axes[0].plot(x / width, hertz.pressure(x) / peak, "k--", lw=1.0, label="Hertz")
     for label, table in tables.items():
-        assert table is not None
         near = table["x"] <= x[-1]
         where = table["x"][near]
         (line,) = axes[0].plot(where / width, table["pressure"][near] / peak, label=label)

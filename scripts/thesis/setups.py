@@ -35,7 +35,6 @@ def constants(report: Report) -> None:
     case = load_case(CASES / "piezo-8-2.toml")
     (_, material), *_ = case.materials
     piezo = material.coupling
-    assert piezo is not None and material.young is not None and material.poisson is not None
     rows = (
         ("E", "GPa", 58.7102, material.young),
         ("nu", "", 0.3912, material.poisson),
@@ -47,7 +46,6 @@ def constants(report: Report) -> None:
     )
     columns = empty("constant", "unit", "thesis", "case file", "case file by the thesis")
     for name, unit, thesis, ours in rows:
-        assert ours is not None
         factor = GIGA * VACUUM if name.startswith("beta") else 1.0
         append(columns, name, unit, thesis, float(ours), float(ours) / factor / thesis)
     report.table(

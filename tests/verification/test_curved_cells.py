@@ -20,8 +20,8 @@ from contact.results.error_estimate import estimated
 from scripts.force_balance import force_balance
 from scripts.reporting import Report
 from scripts.studies import cell_orders, curved_cells
-from scripts.studies.curved_cells import LAME, LAW, on_a_shaft, solved, supports, two_rings
-from scripts.studies.lame_rings import Lame, error, rings
+from scripts.studies.curved_cells import solved, two_rings
+from scripts.studies.lame_rings import LAME, LAW, Lame, error, on_a_shaft, rings, supports
 from tests.problems.mechanics import state_of
 from tests.problems.written import rows_of
 
