@@ -55,7 +55,7 @@ def two_rings(domain: Domain, degree: int, on: str = "outer0") -> ContactProblem
 
 def solved(problem: ContactProblem) -> tuple[float, Array]:
     """Return the error of the displacements in L2, and the pressures of all ranks."""
-    state = state_of(problem, 1e-11)
+    state = state_of(problem, 1e-10)
     size = error(problem.body.space, state.x, LAME)
     return size, problem.nodes.gather(state.forces.contact)
 
