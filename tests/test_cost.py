@@ -79,11 +79,17 @@ LARGEST = 0.0366836772
 Counted = Callable[[Path], Counters]
 
 
+def counters_of(solution: Solution) -> Counters:
+    """Return the counts of a solution, which has converged."""
+    assert solution.converged, solution.outcome.reason
+    return solution.counters
+
+
 def of_case(case: dict[str, Any] | Case, **options: Any) -> Counted:
     """Solve a case, by other options than its own if some are given."""
     read = parse_case(case) if isinstance(case, dict) else case
     given = [NewtonOptions(**options)] if options else []
-    return lambda _: solve(read, *given, comm=COMM).counters
+    return lambda _: counters_of(solve(read, *given, comm=COMM))
 
 
 def by_newton(problem: Callable[[], ContactProblem], **options: Any) -> Counted:
@@ -97,7 +103,7 @@ def drawn(name: str, kind: str = "hard", **mesh: str) -> Counted:
     def counted(folder: Path) -> Counters:
         tables = next(problems(kind, name, folder=folder)).tables
         case = parse_case({**tables, "mesh": tables["mesh"] | mesh})
-        return solve(build_problem(case, COMM), NewtonOptions()).counters
+        return counters_of(solve(build_problem(case, COMM), NewtonOptions()))
 
     return counted
 
@@ -141,11 +147,11 @@ def ring(_: Path) -> Counters:
     return solve(case, domain=between_plates(COMM, 1)).counters
 
 
-def ball_on_ball(linear: str, mu: float, push: float) -> Counted:
+def ball_on_ball(mu: float, push: float) -> Counted:
     def counted(_: Path) -> Counters:
         # Small systems have no coarse levels otherwise.
         with patch.dict(multigrid.DEFAULTS, {"pc_gamg_coarse_eq_limit": "200"}):
-            return solve(balls(linear, mu, push)).counters
+            return counters_of(solve(balls("iterative", mu, push)))
 
     return counted
 
@@ -171,17 +177,14 @@ def bolted(_: Path) -> Counters:
     return largest_of(solve(tightened(bolt, cut=cut), options).counters for bolt, cut in every)
 
 
-def tilted_punch(linear: str) -> Counted:
-    def counted(_: Path) -> Counters:
-        pytest.importorskip("gmsh")
-        return solve(punch(0.25, f"solver.linear={linear}")).counters
-
-    return counted
+def tilted_punch(_: Path) -> Counters:
+    pytest.importorskip("gmsh")
+    return counters_of(solve(punch(0.25)))
 
 
 def penalised(_: Path) -> Counters:
     method = stiff()
-    method.solve()
+    assert method.solve()[1].converged
     return method.counters
 
 
@@ -208,7 +211,7 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
         of_case(clamped(beam(40.0, [160, 4], PRESSED, 0.3, 0.3))),
         (1, 1, 32),
     ),
-    # Not condensed onto most of its nodes
+    # Not condensed onto most of its nodes: dense steps took 24 s, sparse ones take 0.1 s
     "beam on all of its length": (of_case(beam(600.0, [1200, 2], HEAVY, 0.0, 0.3)), (2, 2, 0)),
     "beam whose tip is pressed": (of_case(on_the_ground()), (1, 1, 81)),
     "beam whose tip is pressed, whole": (of_case(on_the_ground(), condense=False), (74, 54, 0)),
@@ -270,9 +273,8 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
     "block on a block": (of_case(pairs.case()), (1, 1, 3)),
     "box on a box": (lambda _: halved("over", "under").counters, (1, 1, 2)),
     "box under a box": (lambda _: halved("under", "over").counters, (1, 1, 2)),
-    "ball on a ball": (ball_on_ball("lu", 0.3, 0.5), (1, 1, 9)),
-    "ball on a ball, iterative": (ball_on_ball("iterative", 0.0, 0.0), (7, 2, 0)),
-    "ball on a ball, iterative, friction": (ball_on_ball("iterative", 0.3, 0.5), (10, 2, 0)),
+    "ball on a ball": (ball_on_ball(0.0, 0.0), (7, 2, 0)),
+    "ball on a ball, friction": (ball_on_ball(0.3, 0.5), (10, 2, 0)),
     # Bodies that supports do not hold. Rounding decides: these are the largest counts of runs with
     # moduli that differ by 1e-12, of 170 with the ring, of 6 with the others.
     "ring on a plate": (ring, (2, 1, 100)),
@@ -321,7 +323,6 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
         indenter(3, 2, degree=2, displacement="free", force=-0.02),
         (1, 1, 5),
     ),
-    "indenter that is moved, degree 2": (indenter(3, 2, degree=2, displacement=-0.02), (1, 1, 4)),
     "indenter that is free, whole": (
         of_case(indented(n=8, **FREE), **EXACT, condense=False, linear="lu"),
         (4, 3, 0),
@@ -332,8 +333,7 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
     ),
     "tilted punch": (lambda _: punched(7, 20.0, False, TILTED).counters, (1, 1, 3)),
     "circular punch": (lambda _: punched(6, 20.0, True, SUNK).counters, (1, 1, 3)),
-    "tilted punch, 3-D": (tilted_punch("auto"), (1, 1, 2)),
-    "tilted punch, 3-D, direct": (tilted_punch("lu"), (1, 1, 2)),
+    "tilted punch, 3-D": (tilted_punch, (1, 1, 2)),
     "plate on two blocks": (by_newton(stacked), (1, 1, 2)),
     "bolt and flanges": (bolted, (1, 1, 3)),
     # Algorithms of the thesis

@@ -11,7 +11,6 @@ from mpi4py import MPI
 from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.model.obstacle import SHAPES
 from tests.problems.bar import changed
 from tests.problems.messages import message_of
 
@@ -152,12 +151,6 @@ def shaped(foundation, more):
 def test_messages_of_bad_shapes(snapshot):
     said = {name: message_of(shaped, *given) for name, given in BAD_SHAPES.items()}
     snapshot("refused-shapes", said)
-
-
-@pytest.mark.parametrize("kind", SHAPES)
-def test_a_name_that_is_nearly_a_shape_hints_at_it(kind):
-    said = message_of(shaped, {"shape": f"{kind.shape.title()}s"}, {})
-    assert f'did you mean "{kind.shape}"?' in said
 
 
 def test_a_surface_is_no_foundation_in_the_plane():

@@ -72,24 +72,9 @@ def test_going_on(tmp_path, count, elsewhere):
 
 
 @pytest.mark.core
-@pytest.mark.parametrize("count", [1, 4])
-def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, count):
-    """Of press, shear and unload with friction: bit for bit on the same ranks."""
-    case = block("chaboche", cells=3)
-    whole = solve(case, comm=SELF)
-    with ended(count):
-        solve_and_keep(case, None, SELF, tmp_path)
-    solution = solve_and_keep(case, None, SELF, tmp_path, tmp_path)
-    assert solution.converged and len(solution.steps) == len(whole.steps)
-    assert whole.plastic_dissipation > 0
-    for one, two in zip(whole.steps, solution.steps, strict=True):
-        assert close(one.state, two.state, rtol=1e-12, atol=0.0)
-
-
-@pytest.mark.core
 @pytest.mark.parallel
 def test_other_ranks_go_on(shared_tmp_path: Path) -> None:
-    """All ranks, one of them alone, and all again in one folder."""
+    """All ranks, one of them alone, and all again in one folder; of one rank bit for bit."""
     world, place = MPI.COMM_WORLD, shared_tmp_path / "checkpoints"
     case = block("chaboche", cells=3)
     whole = solve(case, comm=world)
@@ -104,8 +89,10 @@ def test_other_ranks_go_on(shared_tmp_path: Path) -> None:
         world.barrier()
     assert solution.converged and len(solution.steps) == len(whole.steps) == 6
     assert len(solution.history) < len(whole.history)
+    assert whole.plastic_dissipation > 0
+    close_to = {"rtol": 1e-12} if world.size == 1 else {"rtol": 1e-9, "atol": 1e-9}
     for one, two in zip(whole.steps, solution.steps, strict=True):
-        assert close(one.state, two.state, rtol=1e-9, atol=1e-9)
+        assert close(one.state, two.state, **close_to)
     assert sorted(path.name for path in place.iterdir()) == [f"{k:05d}.npz" for k in range(1, 7)]
     again = read_steps(shared_tmp_path, whole.problem)
     assert [step.state.time for step in again] == [step.state.time for step in whole.steps]
@@ -166,8 +153,7 @@ def test_a_complete_run_may_be_run_again_and_go_on_anywhere(tmp_path, monkeypatc
     assert on_the_line("solve", tmp_path / "case.toml", "--out", tmp_path / "out") == 0
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number, status):
+def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd):
     """They are written, and checkpoints remain to go on from, to the numbers of a whole run."""
     keep, out, case = Checkpoints.keep, tmp_path / "out", tmp_path / "case.toml"
     case.write_text(to_toml(hencky()))
@@ -176,16 +162,16 @@ def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number,
     def interrupted(self, record):
         keep(self, record)
         if self._count == 2:
-            signal.raise_signal(number)
+            signal.raise_signal(signal.SIGTERM)
 
     with monkeypatch.context() as context:
         context.setattr(Checkpoints, "keep", interrupted)
-        assert on_the_line("solve", case, "--out", out) == status
+        assert on_the_line("solve", case, "--out", out) == 143
     assert f"results in {out}; contact solve --restart {out} goes on" in capfd.readouterr().err
     assert len(rows_of(out / "steps.csv")) == 2
     summary = json.loads((out / "summary.json").read_text())
     assert not summary["converged"]
-    assert f"interrupted ({number.name})" in summary["reason"]
+    assert "interrupted (SIGTERM)" in summary["reason"]
     assert len(list((out / "checkpoints").glob("0*.npz"))) == 2
     assert on_the_line("solve", "--restart", out) == 0
     for one, two in zip(
@@ -193,12 +179,6 @@ def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number,
     ):
         for name in one.keys() - {"linear_solves", "factorizations", "kkt"}:
             assert float(two[name]) == pytest.approx(float(one[name]), rel=1e-9, abs=1e-12)
-
-
-def test_read_steps_gives_the_states(tmp_path):
-    solution = solve_and_keep(steps_case(), None, SELF, tmp_path)
-    for one, two in zip(solution.steps, read_steps(tmp_path, solution.problem), strict=True):
-        assert close(one.state, two.state)
 
 
 MESHES = Path(__file__).parents[2] / "meshes" / "fixtures"

@@ -55,6 +55,7 @@ TABLES = {
 def test_tables_are_the_same_objects() -> None:
     case = parse_case(TABLES)
     assert case.material == Material(name="PZT-4", units="GPa", poling=30.0)
+    assert Material(Linear(1.0, 0.3)).law == Linear(1.0, 0.3)
     for part in (
         Rigid("left", Motion(["free", 0.0], force=[0.1, 0.0])),
         Rigid("left", displacement=["free", 0.0], force=[0.1, 0.0]),
@@ -82,22 +83,6 @@ def test_objects_stand_for_keys() -> None:
     assert one.contact_force == pytest.approx(other.contact_force, rel=1e-10)
     assert one.charges.foundation == pytest.approx(other.charges.foundation, rel=1e-10)
     assert abs(one.charges.foundation) > 0
-
-
-def test_a_material_of_keys_is_turned_into_the_body() -> None:
-    """A crystal aslant, among others, as in a case."""
-    keys = {"name": "PZT-4", "units": "GPa", "poling": 30.0}
-    case = parse_case(
-        {
-            **{key: TABLES[key] for key in ("mesh", "fixed")},
-            "material": keys,
-            "contact": {"on": "bottom"},
-        }
-    )
-    body = Body(Material(**keys), Fixed("top", [0.0, -0.005], potential=0.0))
-    one, other = solve(case), solve(Problem(block(), body, Contact("bottom")))
-    assert one.contact_force == pytest.approx(other.contact_force, rel=1e-10)
-    assert Material(Linear(1.0, 0.3)).law == Linear(1.0, 0.3)
 
 
 def test_foundations_move_by_the_contact() -> None:

@@ -13,6 +13,7 @@ from contact import (
     Fixed,
     Friction,
     Load,
+    Material,
     Problem,
     evolve,
     make_material,
@@ -145,14 +146,14 @@ def test_steps_of_a_problem() -> None:
 def test_materials_of_keys() -> None:
     """They are those of a case with the same keys; a list of them makes a body."""
     keys = {"name": "PZT-4", "units": "GPa", "poling": 30.0}
-    given = make_material(2, **keys)
     potential = {"on": "bottom", "potential": 0.0}
     mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4]}
     fixed = [{"on": "top", "displacement": [0, -0.005], "potential": 0.01}, potential]
     case = {"mesh": mesh, "material": keys, "fixed": fixed, "contact": {"on": "bottom"}}
     plain = solve(parse_case(case))
-    body = Body([given], [Fixed("top", [0, -0.005], 0.01), Fixed("bottom", potential=0.0)])
-    same = solve(Problem(block(), body, Contact("bottom")))
-    assert same.contact_force == pytest.approx(plain.contact_force, rel=1e-10)
-    assert same.charges is not None
-    assert same.charges.electrodes == pytest.approx(plain.charges.electrodes, rel=1e-8)
+    for given in ([make_material(2, **keys)], Material(**keys)):
+        body = Body(given, [Fixed("top", [0, -0.005], 0.01), Fixed("bottom", potential=0.0)])
+        same = solve(Problem(block(), body, Contact("bottom")))
+        assert same.contact_force == pytest.approx(plain.contact_force, rel=1e-10)
+        assert same.charges is not None
+        assert same.charges.electrodes == pytest.approx(plain.charges.electrodes, rel=1e-8)

@@ -129,6 +129,7 @@ def test_makes_the_place_once_and_passes_the_status(launcher, place):
     assert launcher.calls() == 1
 
 
+@pytest.mark.parametrize("place", ["trixie"], indirect=True)  # the lock is one for both
 def test_a_second_start_waits_for_the_first(launcher, place):
     with launcher.start("true", FAKE_SECONDS="2") as first:
         while launcher.calls() == 0:
@@ -138,6 +139,7 @@ def test_a_second_start_waits_for_the_first(launcher, place):
     assert "waiting for it" in err
 
 
+@pytest.mark.parametrize("place", ["wheels"], indirect=True)
 def test_what_a_killed_start_has_begun_is_finished(launcher, place):
     with launcher.start("true", FAKE_SECONDS="2") as first:
         while launcher.calls() == 0:

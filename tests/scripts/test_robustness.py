@@ -16,15 +16,6 @@ from scripts.studies.robustness.check import Mesh, internal_forces, recheck
 from scripts.studies.robustness.problems import problems
 
 
-@pytest.mark.parametrize("name", ["bimorph-3", "bimorph-8", "unsupported-5"])
-def test_what_takes_no_block_relaxation(name):
-    """A bent bimorph, a good conductor, and a block that Newton's loop lets fly away."""
-    case = next(problems("hard", name)).case
-    solution = solve(build_problem(case), NewtonOptions())
-    assert solution.converged, solution.outcome.reason
-    assert not any("block relaxation" in record.note for record in solution.history)
-
-
 @pytest.mark.parametrize("condense", [True, False])
 def test_contact_forces_that_are_all_rounding_are_none(condense):
     """lifted-4: a beam on the ground pressed along it with nu 0, which asks for none."""
@@ -89,20 +80,19 @@ def test_results_are_right_by_another_assembly(name, tmp_path):
     assert judge(drawn, solution, tmp_path / "out") == {}
 
 
-@pytest.mark.parametrize(
-    ("column", "check"), [("pressure", "equilibrium"), ("tau", "bound"), ("u_n", "penetration")]
-)
-def test_wrong_results_are_seen(column, check, tmp_path):
+def test_wrong_results_are_seen(tmp_path):
     """A thousandth of a pressure, of a friction stress or of a displacement along the normal."""
     drawn = problem("clouds-0", tmp_path)
     judge(drawn, solve(drawn.case, comm=MPI.COMM_SELF), tmp_path / "out")
     path = tmp_path / "out" / "contact.csv"
-    header, *rows = (line.split(",") for line in path.read_text().splitlines())
-    k, pressed = header.index(column), header.index("pressure")
-    row = max(rows, key=lambda row: float(row[pressed]))
-    row[k] = repr(1.001 * float(row[k]) + 1e-6 * (column == "u_n"))
-    path.write_text("\n".join(",".join(row) for row in [header, *rows]) + "\n")
-    assert recheck(drawn.mesh, drawn.tables, tmp_path / "out")[check] > SMALL
+    right = path.read_text()
+    for column, check in {"pressure": "equilibrium", "tau": "bound", "u_n": "penetration"}.items():
+        header, *rows = (line.split(",") for line in right.splitlines())
+        k, pressed = header.index(column), header.index("pressure")
+        row = max(rows, key=lambda row: float(row[pressed]))
+        row[k] = repr(1.001 * float(row[k]) + 1e-6 * (column == "u_n"))
+        path.write_text("\n".join(",".join(row) for row in [header, *rows]) + "\n")
+        assert recheck(drawn.mesh, drawn.tables, tmp_path / "out")[check] > SMALL, column
 
 
 @pytest.mark.core

@@ -17,8 +17,9 @@ from tests.problems.piezo import Column, example, first_solve, hencky, potential
 
 COMM = MPI.COMM_WORLD
 SLIP = Friction(SlipCoefficient(0.5, 0.2, 1.0))
-K_E = (0.0, 1e-3, 1e-2, 1e-1, 1.0)
-PHI_F = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+#: First, middle and last of the series of the thesis.
+K_E = (0.0, 1e-2, 1.0)
+PHI_F = (0.0, 4.0, 32.0)
 
 
 def extremes(solver):
