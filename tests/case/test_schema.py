@@ -5,7 +5,6 @@ Every key described, methods with their options, the page on the case file.
 
 import json
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -41,19 +40,17 @@ def test_it_takes_the_case_files(name: str) -> None:
     assert valid(tomllib.loads(to_toml(load_case(path))))  # with all defaults
 
 
-@pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
-def test_it_refuses_an_unknown_key_in_any_section(path: Path) -> None:
-    data = tomllib.loads(path.read_text())
-    data["unknown"] = 1
-    assert not valid(data)
-    del data["unknown"]
-    for key, section in data.items():
-        for table in section if isinstance(section, list) else [section]:
-            if isinstance(table, dict):
-                table["unknown"] = 1
-                assert not valid(data), key
-                del table["unknown"]
-    assert valid(data)
+def test_it_refuses_an_unknown_key_in_any_section() -> None:
+    """Of any case file: `test_it_takes_the_case_files` says that they are right without it."""
+    for path in sorted(CASES.glob("*.toml")):
+        data = tomllib.loads(path.read_text())
+        assert not valid(data | {"unknown": 1})
+        for key, section in data.items():
+            for table in section if isinstance(section, list) else [section]:
+                if isinstance(table, dict):
+                    table["unknown"] = 1
+                    assert not valid(data), (path.stem, key)
+                    del table["unknown"]
 
 
 @pytest.mark.parametrize(

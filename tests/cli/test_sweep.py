@@ -108,19 +108,20 @@ DAMAGED = {
 }
 
 
-@pytest.mark.parametrize("kind", DAMAGED)
-def test_damaged_files_are_refused_and_kept(sweep, tmp_path, capfd, kind):
+def test_damaged_files_are_refused_and_kept(sweep, tmp_path, capfd):
     sweep("--over", "friction.mu=0.2,0.4")
-    name, damage = DAMAGED[kind]
-    path = tmp_path / "out" / name
-    path.write_bytes(damage(path.read_bytes()))
-    before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
-    capfd.readouterr()
-    assert main(["sweep", str(tmp_path / "bar.toml"), "--out", str(tmp_path / "out"),
-                 "--over", "friction.mu=0.2,0.3", "--quiet"]) == 2  # fmt: skip
-    message = capfd.readouterr().err
-    assert message.startswith("contact: ") and message.count("\n") == 1
-    assert {path: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+    whole = {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    for kind, (name, damage) in DAMAGED.items():
+        path = tmp_path / "out" / name
+        path.write_bytes(damage(whole[path]))
+        before = whole | {path: path.read_bytes()}
+        capfd.readouterr()
+        assert main(["sweep", str(tmp_path / "bar.toml"), "--out", str(tmp_path / "out"),
+                     "--over", "friction.mu=0.2,0.3", "--quiet"]) == 2, kind  # fmt: skip
+        message = capfd.readouterr().err
+        assert message.startswith("contact: ") and message.count("\n") == 1
+        assert {path: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+        path.write_bytes(whole[path])
 
 
 def test_columns_of_the_summary(sweep):

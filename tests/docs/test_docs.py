@@ -6,6 +6,7 @@ import itertools
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -78,6 +79,7 @@ def run_bar(folder: Path) -> int:
     return main(["solve", case, "--out", str(folder / "results"), *coarse])
 
 
+@cache
 def anchors(page: Path) -> set[str]:
     """Return the headings of a page as the ends of links, in GitHub's spelling."""
     included = re.findall(r"^```{include} (\S+\.md)$", page.read_text(), re.M)
@@ -87,16 +89,16 @@ def anchors(page: Path) -> set[str]:
     return {heading.replace(" ", "-") for heading in words}
 
 
-@pytest.mark.parametrize("page", [*sorted(DOCS.glob("*.md")), ROOT / "README.md"], ids=str)
-def test_links_lead_somewhere(page: Path) -> None:
-    written = page.read_text()
-    links = re.findall(r"\]\(([^)#:\s]*)(?:#([^)\s]*))?\)", written)
-    for target, anchor in [*links, *re.findall(r'src="([^":]+)()"', written)]:
-        there = page.parent / target if target else page
-        assert there.exists(), target
-        if target.endswith(".png"):  # a whole one
-            assert there.read_bytes()[-8:-4] == b"IEND", target
-        assert not anchor or anchor in anchors(there), f"{target}#{anchor}"
+def test_links_lead_somewhere() -> None:
+    for page in [*sorted(DOCS.glob("*.md")), ROOT / "README.md"]:
+        written = page.read_text()
+        links = re.findall(r"\]\(([^)#:\s]*)(?:#([^)\s]*))?\)", written)
+        for target, anchor in [*links, *re.findall(r'src="([^":]+)()"', written)]:
+            there = page.parent / target if target else page
+            assert there.exists(), f"{page.name}: {target}"
+            if target.endswith(".png"):  # a whole one
+                assert there.read_bytes()[-8:-4] == b"IEND", f"{page.name}: {target}"
+            assert not anchor or anchor in anchors(there), f"{page.name}: {target}#{anchor}"
 
 
 def listed(page: str) -> list[str]:

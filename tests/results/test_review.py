@@ -4,6 +4,7 @@ Names of units label figures and stand in the summary; nothing is assumed withou
 """
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,7 +23,9 @@ from tests.problems.rigid import indented
 from tests.problems.written import block
 
 
+@cache
 def reviewed(name: str, *overrides: str) -> Solution:
+    """Return the solution of a case, which no test changes."""
     return solve(load_case(CASES / f"{name}.toml", ("solver.method=newton", *overrides)))
 
 

@@ -205,10 +205,11 @@ def test_tables_of_pages_are_those_of_the_measured_files(tmp_path):
     assert page.read_text() == SCALING.read_text()
 
 
-@pytest.mark.parametrize(("place", "name"), [where for where in PHASES.values() if where[0] != "~"])
-def test_what_a_phase_is_measured_by_is_there(place, name):
+def test_what_a_phase_is_measured_by_is_there():
     """A function that has moved would be a phase of no seconds."""
-    assert f"def {name}(" in (Path(contact.__file__).parent / place).read_text()
+    for place, name in PHASES.values():
+        if place != "~":
+            assert f"def {name}(" in (Path(contact.__file__).parent / place).read_text(), name
 
 
 #: Examples that take less than half a second.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Heights, InputError, parse_case, solve
+from contact import Heights, InputError, build_problem, parse_case, solve
 
 COMM = MPI.COMM_WORLD
 YOUNG, POISSON = 10.0, 0.3
@@ -134,20 +134,24 @@ def test_heights_that_are_none(tmp_path, name):
     text, message = BAD[name]
     (tmp_path / "bad.csv").write_text(text)
     with pytest.raises(InputError) as error:
-        solve(pressed({"shape": "heights", "file": str(tmp_path / "bad.csv")}))
+        build_problem(moved_towards(tmp_path / "bad.csv", 0.0))
     assert message in str(error.value)
 
 
 def flat(tmp_path, x, approach):
     """Return a block that is moved towards heights of 0 in some places."""
     write(tmp_path / "flat.csv", np.asarray(x), np.zeros(len(x)))
-    foundation = {"shape": "heights", "file": str(tmp_path / "flat.csv")}
+    return moved_towards(tmp_path / "flat.csv", approach)
+
+
+def moved_towards(file, approach):
+    """Return a block that is moved towards the heights of a file."""
     return parse_case(
         {
             "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [20, 10]},
             "material": {"young": 1.0, "poisson": 0.3},
             "fixed": [{"on": "top", "displacement": [0.0, approach]}],
-            "contact": {"on": "bottom", "foundation": foundation},
+            "contact": {"on": "bottom", "foundation": {"shape": "heights", "file": str(file)}},
         }
     )
 
