@@ -8,7 +8,6 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 from dolfinx import fem
-from dolfinx.mesh import create_rectangle, locate_entities_boundary
 from mpi4py import MPI
 
 from contact import (
@@ -37,6 +36,7 @@ from contact.derivatives.by_parameters import LoadPath, logger
 from contact.linear import multigrid
 from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh
+from contact.mesh.grid import rectangle
 from contact.problem.linearised import Equations
 from contact.results.quantities import named_functionals
 from tests.problems.rigid import indented
@@ -280,16 +280,12 @@ def test_gradient_by_a_field_adds_up(name):
 
 def test_gradient_by_a_field_cell_by_cell():
     # three cells are regions of their own, whose moduli can be changed
-    mesh = create_rectangle(SELF, [[0.0, 0.0], [2.0, 1.0]], [8, 4])
-    cells = mesh.topology.index_map(2).size_local
+    plain = rectangle(SELF, (0.0, 0.0), (2.0, 1.0), (8, 4))
+    cells = plain.mesh.topology.index_map(2).size_local
     alone = np.array([5, 20, 40], dtype=np.int32)
     rest = np.setdiff1d(np.arange(cells, dtype=np.int32), alone)
-    parts = {
-        name: locate_entities_boundary(mesh, 1, lambda x, y=y: np.isclose(x[1], y))
-        for name, y in (("top", 1.0), ("bottom", 0.0))
-    }
     regions = {"rest": rest} | {f"cell {k}": alone[k : k + 1] for k in range(3)}
-    domain = from_mesh(mesh, parts, regions=regions)
+    domain = from_mesh(plain.mesh, plain.parts, regions=regions)
 
     def build(*changes):
         moduli = {"rest": 1.0} | {f"cell {k}": 1.0 + change for k, change in enumerate(changes)}
@@ -323,13 +319,8 @@ def test_gradient_by_a_field_cell_by_cell():
 @pytest.mark.parallel
 @pytest.mark.parametrize(("law", "degree"), [("linear", 0), ("linear", 1), ("log", 1)])
 def test_a_modulus_that_is_a_field_and_its_gradient(law, degree):
-    comm = MPI.COMM_WORLD
-    mesh = create_rectangle(comm, [[0.0, 0.0], [2.0, 1.0]], [8, 4])
-    parts = {
-        name: locate_entities_boundary(mesh, 1, lambda x, y=y: np.isclose(x[1], y))
-        for name, y in (("top", 1.0), ("bottom", 0.0))
-    }
-    domain, kind = from_mesh(mesh, parts), ("DG" if degree == 0 else "Lagrange", degree)
+    comm, kind = MPI.COMM_WORLD, ("DG" if degree == 0 else "Lagrange", degree)
+    domain = rectangle(comm, (0.0, 0.0), (2.0, 1.0), (8, 4))
     space = fem.functionspace(domain.mesh, kind)
     laws = {"linear": Linear(1.0, 0.3), "log": Log(1.0, 0.3, yield_strain=0.01)}
     change = fem.Function(space)

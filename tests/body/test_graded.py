@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from dolfinx import fem
-from dolfinx.mesh import create_rectangle, locate_entities, locate_entities_boundary
 from mpi4py import MPI
 
 from contact import (
@@ -20,26 +19,17 @@ from contact import (
     solve,
 )
 from contact.mesh.domain import from_mesh
+from contact.mesh.grid import rectangle
 from contact.results.error_estimate import estimated
 from contact.results.fields import DerivedFields
 
 SELF, TIGHT = MPI.COMM_SELF, NewtonOptions(tolerance=1e-12)
 
 
-SIDES = {"top": (1, 1.0), "bottom": (1, 0.0), "left": (0, 0.0), "right": (0, 2.0)}
-
-
 def block(cells=8, regions=False, comm=SELF):
-    mesh = create_rectangle(comm, [[0.0, 0.0], [2.0, 1.0]], [2 * cells, cells])
-    parts = {
-        name: locate_entities_boundary(mesh, 1, lambda x, i=i, at=at: np.isclose(x[i], at))
-        for name, (i, at) in SIDES.items()
-    }
-    halves = {
-        "left half": locate_entities(mesh, 2, lambda x: x[0] <= 1 + 1e-9),
-        "right half": locate_entities(mesh, 2, lambda x: x[0] >= 1 - 1e-9),
-    }
-    return from_mesh(mesh, parts, regions=halves if regions else None)
+    plain = rectangle(comm, (0.0, 0.0), (2.0, 1.0), (2 * cells, cells))
+    halves = {"left half": lambda x: x[0] <= 1 + 1e-9, "right half": lambda x: x[0] >= 1 - 1e-9}
+    return from_mesh(plain.mesh, plain.parts, regions=halves if regions else None)
 
 
 def pressed(domain, materials, degree=1):

@@ -17,6 +17,7 @@ from contact.cli.main import main
 from contact.cli.setup import draw_setup
 from scripts.cases import CASES
 from tests.problems.bar import changed
+from tests.problems.clamped import clamped
 
 NOTHING = "nothing is loaded or moved"
 MESH = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [4, 2]}
@@ -147,14 +148,7 @@ def test_every_case_has_a_picture(name):
 
 def arrows_on_top(**load):
     """Return the arrows of a load on the upper side of a rectangle."""
-    data = {
-        "mesh": {"generator": "rectangle", "size": [4.0, 2.0], "cells": [8, 4]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "top", **load}],
-        "contact": {"on": "bottom"},
-    }
-    case = parse_case(data)
+    case = parse_case(clamped([4.0, 2.0], [8, 4], load=[{"on": "top", **load}]))
     collections = draw_setup(case, build_problem(case)).axes[0].collections
     (arrows,) = (each for each in collections if isinstance(each, Quiver))
     return arrows
@@ -175,24 +169,17 @@ def test_oblique_arrows_are_outside_of_the_body(traction):
 
 def test_tractions_forces_and_pressures_have_one_scale():
     """A force is spread over its part; loads in the whole body have arrows in it."""
-    size = [4.0, 2.0]
-    data = {
-        "mesh": {"generator": "rectangle", "size": size, "cells": [8, 4]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [
-            {"on": "top", "traction": [0.0, "-t"], "force": [0.0, -4.0], "amplitude": "press"},
-            {"on": "right", "force": [1.0, 0.0], "pressure": "-t/2"},
-            {"everywhere": True, "body_force": ["x", 0.0]},
-        ],
-        "contact": {"on": "bottom"},
-        "evolution": {
-            "times": [0.0, 1.0, 2.0],
-            "steps": [1, 1],
-            "amplitudes": {"press": {"time": [0.0, 2.0], "value": [0.0, 1.0]}},
-        },
+    loads = [
+        {"on": "top", "traction": [0.0, "-t"], "force": [0.0, -4.0], "amplitude": "press"},
+        {"on": "right", "force": [1.0, 0.0], "pressure": "-t/2"},
+        {"everywhere": True, "body_force": ["x", 0.0]},
+    ]
+    evolution = {
+        "times": [0.0, 1.0, 2.0],
+        "steps": [1, 1],
+        "amplitudes": {"press": {"time": [0.0, 2.0], "value": [0.0, 1.0]}},
     }
-    case = parse_case(data)
+    case = parse_case(clamped([4.0, 2.0], [8, 4], load=loads, evolution=evolution))
     figure = draw_setup(case, build_problem(case))
     top, right, body = (c for c in figure.axes[0].collections if isinstance(c, Quiver))
     assert top.V == pytest.approx(-0.15 * 4.0) and right.U == pytest.approx(0.15 * 4.0 / 2)
@@ -209,14 +196,7 @@ def test_tractions_forces_and_pressures_have_one_scale():
 def test_arrows_at_narrow_bodies_are_no_hairs():
     widths = []
     for size in [4.0, 2.0], [0.2, 2.0]:
-        data = {
-            "mesh": {"generator": "rectangle", "size": size, "cells": [2, 2]},
-            "material": {"young": 1.0, "poisson": 0.3},
-            "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-            "load": [{"on": "top", "pressure": 1.0}],
-            "contact": {"on": "bottom"},
-        }
-        case = parse_case(data)
+        case = parse_case(clamped(size, [2, 2], load=[{"on": "top", "pressure": 1.0}]))
         figure = draw_setup(case, build_problem(case))
         figure.draw_without_rendering()
         (arrows,) = (c for c in figure.axes[0].collections if isinstance(c, Quiver))

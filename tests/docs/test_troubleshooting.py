@@ -9,7 +9,6 @@ differs.
 import ast
 import re
 from collections import Counter
-from functools import cache
 
 from tests.docs.pages import ROOT
 
@@ -59,25 +58,12 @@ def heads() -> list[str]:
     return re.findall(rf"^ *- ((?:{code})*`[^`]+`(?=:|\*\*$)|\*\*`[^`]+`\*\*$)", PAGE, re.MULTILINE)
 
 
-def of_page() -> tuple[list[str], list[str]]:
-    """Return the identifiers and the phrases of the page."""
+def of_page() -> list[str]:
+    """Return the identifiers of the page."""
     code = [" ".join(one.split()) for head in heads() for one in re.findall(r"`([^`]+)`", head)]
-    named = [one[1:-1] for one in code if re.fullmatch(r"\[[a-z-]+\]", one)]
-    return named, [one for one in code if not one.startswith("[")]
-
-
-@cache
-def sources() -> str:
-    """Return the texts of all sources, each on one line, with … for what is put into them."""
-    said = "\n".join(path.read_text() for path in SOURCES)
-    joined = re.sub(r'"\s*f?"', "", said)
-    return re.sub(r"\{[^{}]*\}", DIFFERS, joined)
-
-
-def fits(phrase: str, text: str) -> bool:
-    return re.search(".*".join(map(re.escape, phrase.split(DIFFERS))), text) is not None
+    return [one[1:-1] for one in code if re.fullmatch(r"\[[a-z-]+\]", one)]
 
 
 def test_each_identifier_has_one_entry() -> None:
     assert len(identifiers()) > 100
-    assert Counter(of_page()[0]) == Counter(identifiers())
+    assert Counter(of_page()) == Counter(identifiers())

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from contact import InputError, build_problem, parse_case, solve
 from contact.interface.grouping import GroupedConductivity
@@ -10,7 +9,6 @@ from contact.results.contact_nodes import contact_table
 from forms.laws import PerfectConductivity, ShiftedConductivity
 from tests.problems.everywhere import displacements
 
-COMM = MPI.COMM_WORLD
 PIECES = {"one": {"side": "bottom", "to": 1.5}, "two": {"side": "bottom", "from": 2.5}}
 
 

@@ -139,9 +139,6 @@ def left_of(session: int) -> list[str]:
     return [process.name for process in processes() if process.session == session]
 
 
-ROOT = Path(__file__).parents[2]
-
-
 @pytest.mark.parallel
 def test_interrupted_solve_keeps_its_results(shared_tmp_path: Path) -> None:
     """A signal on one rank ends the solve on all of them, and what was computed is written."""

@@ -27,6 +27,7 @@ from contact.thesis.acceleration import ResidualMinimiser
 from contact.thesis.uzawa import FrozenProblem, disc_derivative
 from forms.laws import Compliance, ConstantCoefficient
 from tests.problems import mechanics
+from tests.problems.clamped import clamped
 from tests.problems.mechanics import bar_case, close, newton
 from tests.problems.rigid import PIEZO
 
@@ -173,13 +174,9 @@ def test_an_interior_point_with_friction_on_a_layer(kind, rigid):
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
 def test_an_interior_point_where_nothing_acts_but_a_foundation_that_moves(linear):
     """Without loads there was no work to begin with: it stood still, or its numbers were none."""
-    case = {
-        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [32, 8]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "contact": {"on": "bottom", "rigid": {"displacement": [0.01, 0.05]}},
-        "friction": {"law": "coulomb", "mu": 0.3},
-    }
+    contact = {"on": "bottom", "rigid": {"displacement": [0.01, 0.05]}}
+    friction = {"law": "coulomb", "mu": 0.3}
+    case = clamped([4.0, 1.0], [32, 8], contact=contact, friction=friction)
     outcome, same = interior(case, linear)
     assert outcome.converged, outcome.reason
     assert same

@@ -40,6 +40,7 @@ from forms.hencky import Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from scripts.cases import bar
 from tests.problems import mechanics
+from tests.problems.clamped import clamped
 from tests.problems.everywhere import agree
 from tests.problems.mechanics import bar_case, newton
 
@@ -270,15 +271,8 @@ electric = {{ k_e = 1.0, delta = 5.0 }}
 
 def column(**solver):
     """Solve a sheared column of four rows of cells, each a hundred times as high as wide."""
-    case = {
-        "mesh": {"generator": "rectangle", "size": [4.0, 16.0], "cells": [100, 4]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "top", "traction": [2e-3, "-0.01*(1 + x/4)"]}],
-        "contact": {"on": "bottom"},
-        "solver": solver,
-    }
-    return solve(parse_case(case))
+    load = [{"on": "top", "traction": [2e-3, "-0.01*(1 + x/4)"]}]
+    return solve(parse_case(clamped([4.0, 16.0], [100, 4], load=load, solver=solver)))
 
 
 @pytest.mark.parametrize("r", [pytest.param(0.1, marks=pytest.mark.slow), 1.0])

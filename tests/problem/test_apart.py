@@ -21,6 +21,7 @@ from contact.solving import solve, solve_steps
 from contact.solving import solve as solve_case
 from forms.hencky import Linear
 from tests.problems.apart import blocks, pressed
+from tests.problems.clamped import clamped
 from tests.problems.mechanics import bar, pressed_block, turn
 from tests.problems.piezo import pzt
 
@@ -212,15 +213,14 @@ def test_a_gap_out_of_reach_does_not_excuse_small_loads(method):
     """The problem is homogeneous: of small loads half the friction was missing, and converged."""
     forces = []
     for load in (1e-3, 1e-16):
-        section = {
-            "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [16, 4]},
-            "material": {"young": 1.0, "poisson": 0.3},
-            "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-            "load": [{"on": "top", "traction": [0.0, -load]}],
-            "contact": {"on": "bottom", "gap": "where(x < 3, 0, 1)"},
-            "friction": {"law": "coulomb", "mu": 0.3},
-            "solver": {"method": method},
-        }
+        section = clamped(
+            [4.0, 1.0],
+            [16, 4],
+            load=[{"on": "top", "traction": [0.0, -load]}],
+            contact={"on": "bottom", "gap": "where(x < 3, 0, 1)"},
+            friction={"law": "coulomb", "mu": 0.3},
+            solver={"method": method},
+        )
         solution = solve_case(parse_case(section), comm=MPI.COMM_SELF)
         assert solution.converged
         forces.append(solution.contact_force / load)
