@@ -438,7 +438,7 @@ def test_else_it_starts_from_rest(monkeypatch: pytest.MonkeyPatch, change: str) 
 def test_a_slender_body_starts_from_a_coarser_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without it a linear beam that lies down takes more than twice as many factorisations."""
     monkeypatch.setitem(refining.MANY, "whole", 1000)
-    case = beam(100.0, [640, 8], UNIFORM, 0.5, 0.3, **LONG)
+    case = beam(100.0, [400, 8], UNIFORM, 0.5, 0.3, **LONG)
     found, cold = solve(parse_case(case)), solve(parse_case({**case, "solver": {"nested": False}}))
     assert (found.start, cold.start) == ("the solution on a coarser mesh", "the zero initial guess")
     assert found.converged and cold.converged

@@ -17,6 +17,7 @@ def test_as_a_script(monkeypatch):
     assert names["asymmetry"](names["secant"]) < 1e-14
 
 
+@pytest.mark.slow
 def test_as_a_notebook(monkeypatch):
     monkeypatch.delenv("MPLBACKEND", raising=False)  # the kernel shows figures in the notebook
     jupytext = pytest.importorskip("jupytext")

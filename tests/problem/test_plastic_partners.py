@@ -142,8 +142,10 @@ def test_without_coupling_the_field_changes_nothing():
 def test_a_bimorph_marks_its_stop():
     """The case on a coarse mesh: without a halved step, and later to touch the second time."""
     sizes = ["mesh.size=0.5", "mesh.contact_size=0.1", "evolution.steps=[4, 1, 4]"]
-    solution = solve(load_case(CASES / "bimorph-stop.toml", sizes))
-    assert solution.converged and len(solution.steps) == 9
+    case = load_case(CASES / "bimorph-stop.toml", sizes)
+    solution = solve(case)
+    assert case.title and solution.converged and len(solution.steps) == 9
+    assert solution.outcome.residuals.largest <= case.solver.tolerance
     rows = [step.row for step in solution.steps]
     force, lost = (
         np.array([row[name] for row in rows]) for name in ("contact_force_y", "plastic_dissipation")

@@ -141,6 +141,7 @@ def test_tables(tmp_path):
     assert len(rows_of(tmp_path / "piezo-linear-iterations.csv")) == 4
 
 
+@pytest.mark.slow
 def test_figures(tmp_path):
     report = Report(tmp_path)
     figures_piezo.figure_8_2a(report, (16, 8))
@@ -187,6 +188,7 @@ def test_tables_and_figures_are_those_of_the_pages():
     assert {script for scripts in made for script in scripts} == {p.script for p in chapters.PARTS}
 
 
+@pytest.mark.slow
 def test_hertz(tmp_path):
     hertz.main(["--coarse", "--out", str(tmp_path)])
     for name in ("hertz-cylinder.csv", "hertz-sphere.md", "figure-7-2a.png", "figure-7-2b.png"):
