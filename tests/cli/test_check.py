@@ -120,7 +120,6 @@ def test_a_curved_part_has_a_mean_normal():
 
 SMALL = {
     "hertz": ("mesh.contact_size=0.5",),
-    "hertz-sphere": (),
     "piezo-column": ("mesh.cells=[2, 2, 2]",),
     "bar": ("mesh.cells=[16, 4]",),
     "compliance-8-4": ("mesh.cells=[24, 4]",),

@@ -233,7 +233,7 @@ def test_what_was_complete_remains():
 AT_EASE = {"newton": NewtonOptions(tolerance=1e-8), "uzawa": FixedPointOptions(tolerance=1e-8)}
 
 
-@pytest.mark.parametrize("left", [1e-8, 1e-12, 1e-16, 0.0])
+@pytest.mark.parametrize("left", [1e-8, 1e-16, 0.0])
 def test_what_is_unloaded_to_next_to_nothing_is_as_accurate(left):
     """Beside slips of the whole load the relaxation lost what it looked for."""
     amplitude = tabulated((0.0, 1.0, 2.0), (0.0, 1.0, left))

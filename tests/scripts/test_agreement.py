@@ -7,7 +7,7 @@ import pytest
 from contact import build_problem
 from contact.methods.options import NewtonOptions
 from scripts.cases import CASES
-from scripts.studies import agreement, branches
+from scripts.studies import agreement, agreement_examples, branches
 from scripts.studies.agreement_examples import Example
 from scripts.studies.branches import AGREE, Branches
 from tests.problems.written import rows_of
@@ -17,7 +17,9 @@ from tests.problems.written import rows_of
 def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("agreement")
     cases = ("bar", "hertz-sphere", "piezo-8-1-conductive", "compliance-8-3-layer")
-    agreement.main(["--coarse", "--out", str(out), "--only", *cases])
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(agreement_examples, "RHO", (0.0, 1e7, 6e7))
+        agreement.main(["--coarse", "--out", str(out), "--only", *cases])
     return out
 
 
@@ -42,7 +44,7 @@ def test_block_relaxation_is_given_up_after_its_solves(monkeypatch, tmp_path):
 
 def test_newton_and_block_relaxation_agree_or_find_different_solutions(folder):
     found = {row["example"]: row for row in rows_of(folder / "agreement.csv")}
-    assert len(found) == 8
+    assert len(found) == 6
     for name, row in found.items():
         assert max(float(row["newton"]), float(row["uzawa"])) <= 1e-10
         apart = max(float(row[key]) for key in ("u", "energy", "p", "tau"))

@@ -76,6 +76,7 @@ def test_the_dual_norm_of_a_pressure_is_the_energy_that_it_makes():
     assert distances[0] / distances[1] == pytest.approx(10, rel=0.1)
 
 
+@pytest.mark.slow
 def test_sensitivity(tmp_path):
     sensitivity.study(Report(tmp_path, coarse=True), "radius")
     found = rows_of(tmp_path / "sensitivity-radius-table.csv")

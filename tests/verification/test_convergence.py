@@ -144,6 +144,7 @@ def test_rate_of_the_secant_iteration():
     assert secant_rate(0.05 * np.e**4) == pytest.approx(0.8)
 
 
+@pytest.mark.slow
 def test_theorem_4_2(tmp_path):
     values = (1e-3, 1e-8, 1e-9)
     found = table_7_2.study(Report(tmp_path), 8, values)
