@@ -1,23 +1,23 @@
 """The solution that `solve` returns: results of a problem, with figures drawn from its files.
 
-`results/` knows neither files nor figures, and its `Solution` has numbers and fields alone.
+`results/` knows neither files nor figures: its `Results` have numbers and fields alone.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from contact.results import solution as results
+from contact.results.solution import Results
 from contact.writing import written
 
 if TYPE_CHECKING:
     from contact.plot.figures import Gallery
 
 
-class Solution(results.Solution):
+class Solution(Results):
     """The solution of a problem, or the state at which its method has ended, and its figures.
 
-    Its attributes are those of `results.solution.Solution`.
+    Its attributes are those of `contact.results.solution.Results`.
     """
 
     def plot(self, *fields: str, width: float | None = None) -> Gallery | None:

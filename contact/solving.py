@@ -41,10 +41,9 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.problem.state import State
 from contact.refining import adapted, default_start
-from contact.results import solution as results
 from contact.results.fields import check_variables
 from contact.results.remarks import announce
-from contact.results.solution import StepRecord, StepRecorder
+from contact.results.solution import Results, StepRecord, StepRecorder
 from contact.results.uniqueness import uniqueness
 from contact.solution import Solution
 from contact.typing import Array
@@ -126,7 +125,7 @@ def solve(
         After a SIGINT or SIGTERM, with the last iterate; a second signal ends the program.
     """
     clock = time.perf_counter()
-    start = start.state if isinstance(start, results.Solution) else start
+    start = start.state if isinstance(start, Results) else start
     case, options = _checked(case, settings, monitor, start, replacements)
     if isinstance(case, ContactProblem):
         start = None if start is None else _prescribed(case, start)
@@ -226,7 +225,7 @@ def evolve(
     NotConvergedError
         If a step fails; the states before have been given.
     """
-    start = start.state if isinstance(start, results.Solution) else start
+    start = start.state if isinstance(start, Results) else start
     expect("evolve", problem, "a Problem", isinstance(problem, ContactProblem))
     _check_types(settings, monitor, start)
     earlier = before is None or (isinstance(before, State) and start is not None)

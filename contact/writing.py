@@ -38,14 +38,14 @@ from contact.results.quantity import (
     SUMMARY,
     SURFACE,
 )
-from contact.results.solution import Solution
+from contact.results.solution import Results
 
 if TYPE_CHECKING:
     from contact.plot.run import Run
 
 
 def write_outputs(
-    solution: Solution, folder: str | Path | ResultFolder, figures: bool = False
+    solution: Results, folder: str | Path | ResultFolder, figures: bool = False
 ) -> None:
     """Write summary, tables, fields and all that is asked for. Collective.
 
@@ -70,7 +70,7 @@ def write_outputs(
     OSError
         If a library fails to write on this rank; others may wait for it.
     """
-    expect("write_outputs", solution, "a Solution", isinstance(solution, Solution))
+    expect("write_outputs", solution, "a Solution", isinstance(solution, Results))
     fits = isinstance(folder, str | Path | ResultFolder)
     expect("write_outputs: folder", folder, "the name of a folder, or a ResultFolder", fits)
     if isinstance(folder, ResultFolder):
@@ -80,7 +80,7 @@ def write_outputs(
             _replace(solution, held, figures)
 
 
-def written(solution: Solution) -> Run | None:
+def written(solution: Results) -> Run | None:
     """Return the results in the files as figures read them; None but on rank 0. Collective."""
     from contact.plot.run import read_run  # which takes a while to load
 
@@ -92,7 +92,7 @@ def written(solution: Solution) -> Run | None:
         return read_run(Path(folder)) if comm.rank == 0 else None
 
 
-def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
+def _replace(solution: Results, folder: ResultFolder, figures: bool) -> None:
     begin, comm = time.perf_counter(), solution.problem.comm
     failures: list[Exception] = []
 
@@ -136,7 +136,7 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             raise failure
 
 
-def _write_contact_steps(solution: Solution, path: Path) -> None:
+def _write_contact_steps(solution: Results, path: Path) -> None:
     """Write the contact nodes of all steps. Collective."""
     for k, record in enumerate(solution.steps):
         table = contact_table(solution.at_step(record.state).contact)
@@ -144,7 +144,7 @@ def _write_contact_steps(solution: Solution, path: Path) -> None:
         on_root(solution.problem.comm, partial(write_columns, path, table, more=k > 0))
 
 
-def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:
+def _draw(solution: Results, folder: Path, summary: Mapping[str, Any]) -> None:
     """Draw the figures from the files. Collective."""
     from contact.plot.figures import draw, read_run  # which take a while to load
 

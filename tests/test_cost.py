@@ -29,7 +29,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.solving import solve
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

@@ -34,7 +34,7 @@ from contact.methods.report import Monitor
 from contact.methods.signals import SIGNALLED, Terminated, signals_held
 from contact.ranks import on_root
 from contact.results.remarks import locks
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.solving import SolveInterrupted, reviewed, solve, solve_in_steps, solve_problem
 from contact.sweeping import TABLE, Axis, sweep
 from contact.writing import write_outputs

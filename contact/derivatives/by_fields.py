@@ -28,7 +28,7 @@ from contact.derivatives.by_parameters import (
 from contact.errors import InputError
 from contact.history import InternalVariables, LinearisationPoint
 from contact.results.functionals import Differentiable, Functional
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.typing import Array
 
 #: Section of a case whose constants may be fields.

@@ -59,7 +59,7 @@ from contact.problem.state import State
 from contact.ranks import summed
 from contact.results.functionals import Differentiable, Functional, Largest, Reaction
 from contact.results.quantities import named_functionals
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.tolerances import EPS
 from contact.typing import Array
 

@@ -26,7 +26,7 @@ from contact.case.file import Case, number_at, with_number
 from contact.derivatives.by_parameters import sensitivity
 from contact.errors import InputError
 from contact.methods.report import Monitor
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.solving import solve
 from contact.typing import Array
 

@@ -31,7 +31,7 @@ from contact.mesh.geometry import geometry_nodes
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import on_root
-from contact.results.solution import Solution, StepRecord
+from contact.results.solution import Results, StepRecord
 from contact.typing import Array
 
 Arrays: TypeAlias = dict[str, NDArray[Any]]
@@ -147,7 +147,7 @@ def read_steps(folder: str | Path, problem: ContactProblem) -> list[StepRecord]:
     return found
 
 
-def write_checkpoint(solution: Solution, path: str | Path) -> None:
+def write_checkpoint(solution: Results, path: str | Path) -> None:
     """Write the state of a solution into a file. Collective."""
     arrays = _gathered(solution.problem, solution.state)
     on_root(solution.problem.comm, lambda: _write(Path(path), arrays))

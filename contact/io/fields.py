@@ -29,7 +29,7 @@ from contact.problem.state import State
 from contact.ranks import on_root
 from contact.results.contact_nodes import Grid, Values, contact_surface
 from contact.results.fields import DerivedFields, cell_function, linear, nodal_unknowns, unknowns
-from contact.results.solution import Solution
+from contact.results.solution import Results
 
 #: A time, and the state then.
 Frame: TypeAlias = tuple[float, State]
@@ -41,7 +41,7 @@ KINDS = {"float64": "Float64", "int32": "Int32", "int64": "Int64", "uint8": "UIn
 SERIES = ("displacement", "potential", "von_mises")
 
 
-def write_fields(solution: Solution, folder: Path) -> None:
+def write_fields(solution: Results, folder: Path) -> None:
     """Write the fields in the format that is asked for. Collective.
 
     ``fields.vtu`` holds all of them, the derived ones both averaged at the nodes and as they
@@ -82,7 +82,7 @@ def regions_of(problem: ContactProblem) -> NDArray[np.int32]:
     return found
 
 
-def _frames(solution: Solution) -> list[Frame]:
+def _frames(solution: Results) -> list[Frame]:
     """Return the times and states whose fields are written: the last one always."""
     if not solution.steps:
         return [(0.0, solution.state)]
@@ -90,7 +90,7 @@ def _frames(solution: Solution) -> list[Frame]:
     return every[:: -solution.output.every][::-1]
 
 
-def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> None:
+def _write_series(solution: Results, frames: Sequence[Frame], folder: Path) -> None:
     """Write main fields and contact part of each step, a file each, and the lists of these files.
 
     The lists are ``fields.pvd`` and ``contact.pvd``.

@@ -29,7 +29,7 @@ from contact.problem.rigid_modes import (
     sliding_mode,
 )
 from contact.problem.state import State
-from contact.results.solution import Remark, Solution
+from contact.results.solution import Remark, Results
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -50,7 +50,7 @@ MOVED = 1e-3
 CONSTRAINED = 1e-8
 
 
-def sides(solution: Solution) -> Iterator[Remark]:
+def sides(solution: Results) -> Iterator[Remark]:
     """Warn of slave sides that are coarser or stiffer, uncovered in part, or have slid too far."""
     # Multipliers live on the slave side: a coarser one penetrates the finer side, a stiffer one
     # carries pressures that the softer side cannot follow.
@@ -159,7 +159,7 @@ def overlapping(problem: ContactProblem) -> Iterator[Remark]:
     )
 
 
-def unresisted_motions(solution: Solution) -> Iterator[Remark]:
+def unresisted_motions(solution: Results) -> Iterator[Remark]:
     """Warn of rigid-body modes that are free, and that contact hardly resists. Collective."""
     # Contact is taken to resist with c = E/length times areas: along the normal where something
     # presses, along the surface where it sticks, and across the friction where it slips.
@@ -217,7 +217,7 @@ def _regions(problem: ContactProblem, component: NDArray[np.int32], among: Array
     return found
 
 
-def not_held(solution: Solution) -> Iterator[Remark]:
+def not_held(solution: Results) -> Iterator[Remark]:
     """Warn of loads that by limit analysis are more than contact bears, where a method fails."""
     problem, time = solution.problem, solution.state.time
     if solution.converged:
@@ -242,7 +242,7 @@ def not_held(solution: Solution) -> Iterator[Remark]:
 
 
 def _least_constrained(
-    solution: Solution, group: Group, free: Array, touches: NDArray[np.bool_]
+    solution: Results, group: Group, free: Array, touches: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
     """Return ascending relative stiffnesses along free motions, and these, (m, k). Collective."""
     # Shares of their squares that are where they are resisted; the mean square of each is 1.

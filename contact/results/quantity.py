@@ -40,7 +40,7 @@ class Quantity:
     name: str  #: PART, KEY and AXIS in it stand for names of the case, and x, y, z
     unit: str  #: "length", "stress", ..., empty for none
     text: str  #: the description, with the sign
-    #: A function of the subject of a file, called on all ranks: `Solution`, in ``history.csv`` a
+    #: A function of the subject of a file, called on all ranks: `Results`, in ``history.csv`` a
     #: `Record`, in ``contact.csv`` and ``contact.vtu`` `ContactResult`, in ``fields.vtu`` and on
     #: master sides a mapping, of each contact `ContactShare`. By default the functional, or the
     #: attribute or entry of the quantity's name. A mapping has several columns, a vector one per

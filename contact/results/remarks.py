@@ -31,7 +31,7 @@ from contact.problem.state import State
 from contact.results import bodies
 from contact.results.error_estimate import estimated
 from contact.results.fields import DerivedFields, deformation, unloaded
-from contact.results.solution import Note, Remark, Solution
+from contact.results.solution import Note, Remark, Results
 from contact.tolerances import EPS, NEGLIGIBLE, TOUCHING
 from contact.typing import Array
 from forms.j2 import J2
@@ -83,7 +83,7 @@ FINER = "a finer mesh from the beginning, or space.degree = 2"
 CURVED = "a finer mesh, or curved cells (mesh.order = 2)"
 
 
-def announce(solution: Solution) -> None:
+def announce(solution: Results) -> None:
     """Review a solution, and log the warnings. Collective."""
     review(solution)
     if solution.problem.comm.rank == 0:
@@ -91,7 +91,7 @@ def announce(solution: Solution) -> None:
             logger.warning(warning)
 
 
-def evaluate_extremes(solution: Solution, whole: bool = True) -> list[float]:
+def evaluate_extremes(solution: Results, whole: bool = True) -> list[float]:
     """Give a solution its extremes, if `whole` its error too; return |dev eps| by material."""
     body = solution.problem.body
     fields = DerivedFields(body, solution.state)
@@ -115,7 +115,7 @@ def evaluate_extremes(solution: Solution, whole: bool = True) -> list[float]:
     return strains
 
 
-def review(solution: Solution) -> None:
+def review(solution: Results) -> None:
     """Add all remarks to the notes and warnings of a solution. Collective."""
     strains, problem = evaluate_extremes(solution), solution.problem
     times = [record.state.time for record in solution.steps] or [problem.time]
@@ -143,7 +143,7 @@ def review(solution: Solution) -> None:
             listed.append(f"{text} [{identifier}]")
 
 
-def unloading(solution: Solution) -> Iterator[Remark]:
+def unloading(solution: Results) -> Iterator[Remark]:
     """Warn of Hencky's materials that have unloaded from the plastic range in a step."""
     share = unloaded(solution.problem, [record.state for record in solution.steps])
     if share > 0:
@@ -153,7 +153,7 @@ def unloading(solution: Solution) -> Iterator[Remark]:
         )
 
 
-def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remark]:
+def monotonicity(solution: Results, strains: Sequence[float]) -> Iterator[Remark]:
     """Tell of strong monotonicity, (h1), on the strains in Hencky's materials, and of g(0)."""
     domain = solution.problem.domain
     whole = 3 if domain.revolved else domain.dim
@@ -180,7 +180,7 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
             )
 
 
-def small_strain(solution: Solution) -> Iterator[Remark]:
+def small_strain(solution: Results) -> Iterator[Remark]:
     """Warn of strains or rotations that are not small."""
     made = solution.deformation
     if made is None:
@@ -195,7 +195,7 @@ def small_strain(solution: Solution) -> Iterator[Remark]:
         )
 
 
-def untouched(solution: Solution) -> Iterator[Remark]:
+def untouched(solution: Results) -> Iterator[Remark]:
     """Warn of a static problem in which no node is in contact; a load step may end like that."""
     problem = solution.problem
     closed = problem.comm.allreduce(bool(np.any(solution.status != "open")), op=MPI.LOR)
@@ -208,7 +208,7 @@ def untouched(solution: Solution) -> Iterator[Remark]:
         )
 
 
-def rounding(solution: Solution) -> Iterator[Remark]:
+def rounding(solution: Results) -> Iterator[Remark]:
     """Warn of forces that are small beside those in the bodies, and hardly known. Collective."""
     problem, state, outcome = solution.problem, solution.state, solution.outcome
     body, asked, larger = problem.body, outcome.allowed.equilibrium, "far larger forces act"
@@ -237,7 +237,7 @@ def rounding(solution: Solution) -> Iterator[Remark]:
         yield f"{worst:.1e} of loads and contact forces are out of balance: {larger}"
 
 
-def limit_load(solution: Solution) -> Iterator[Remark]:
+def limit_load(solution: Results) -> Iterator[Remark]:
     """Tell that a body without hardening has a limit load, where a method fails."""
     laws = [base_of(material.law) for material in solution.problem.description.materials]
     flows = [law for law in laws if isinstance(law, J2) and not law.kinematic]
@@ -249,7 +249,7 @@ def limit_load(solution: Solution) -> Iterator[Remark]:
         )
 
 
-def several_solutions(solution: Solution) -> Iterator[Remark]:
+def several_solutions(solution: Results) -> Iterator[Remark]:
     """Warn where several solutions may exist. Collective."""
     reasons = falling_friction, strong_friction, falling_layer
     words = f"several solutions may exist, and this is one reached from {solution.start}"
@@ -257,7 +257,7 @@ def several_solutions(solution: Solution) -> Iterator[Remark]:
         yield f"{words}: {reason}"
 
 
-def falling_friction(solution: Solution) -> Iterator[str]:
+def falling_friction(solution: Results) -> Iterator[str]:
     """Find an L_mu above the bound of a sliding block."""
     # Of height H and under the pressure p it slides by s, G (U - s)/H = mu(s) p, which is unique
     # for every U if L_mu < G/(p H). An uneven pressure counts by its own weight, and half of G.
@@ -281,7 +281,7 @@ def falling_friction(solution: Solution) -> Iterator[str]:
         )
 
 
-def strong_friction(solution: Solution) -> Iterator[str]:
+def strong_friction(solution: Results) -> Iterator[str]:
     """Find friction that suffices for several solutions, see `contact.results.uniqueness`."""
     law, nodes = solution.problem.interface.friction.law, solution.problem.nodes
     if solution.jammed:
@@ -300,7 +300,7 @@ def strong_friction(solution: Solution) -> Iterator[str]:
         yield f"the linearised problem is singular from a friction coefficient of {critical:.4g} on"
 
 
-def falling_layer(solution: Solution) -> Iterator[str]:
+def falling_layer(solution: Results) -> Iterator[str]:
     """Find a layer whose p_nu falls: (h~6) of chapter 6 asks for less."""
     problem = solution.problem
     layers = (contact.compliant_layer for contact in problem.contacts)
@@ -308,7 +308,7 @@ def falling_layer(solution: Solution) -> Iterator[str]:
         yield "p_nu falls with the penetration of the layer"
 
 
-def locks(solution: Solution) -> str | None:
+def locks(solution: Results) -> str | None:
     """Return the remedy of elements that may be much too stiff, for volumes hardly change."""
     error, body = solution.error, solution.problem.body
     stiff = error is not None and (error.stiffness_ratio or 0.0) >= LOCKED
@@ -317,7 +317,7 @@ def locks(solution: Solution) -> str | None:
     return unlocked(body.element, body.degree, shape_of(body.domain.mesh))
 
 
-def locking(solution: Solution) -> Iterator[Remark]:
+def locking(solution: Results) -> Iterator[Remark]:
     """Warn of volumetric locking, or that of stiff fibres."""
     error, remedy = solution.error, locks(solution)
     if error is not None and remedy is not None:
@@ -328,7 +328,7 @@ def locking(solution: Solution) -> Iterator[Remark]:
         )
 
 
-def large_error(solution: Solution) -> Iterator[Remark]:
+def large_error(solution: Results) -> Iterator[Remark]:
     """Warn of an estimated error that is large."""
     error = solution.error
     if error is not None and error.relative > COARSE and not locks(solution):
@@ -341,7 +341,7 @@ def large_error(solution: Solution) -> Iterator[Remark]:
         )
 
 
-def resolution(solution: Solution) -> Iterator[Remark]:
+def resolution(solution: Results) -> Iterator[Remark]:
     """Warn of less than `ACROSS` nodes across a contact zone that ends within the contact part."""
     problem, nodes = solution.problem, solution.problem.nodes
     closed = solution.status != "open"
@@ -364,7 +364,7 @@ def resolution(solution: Solution) -> Iterator[Remark]:
         )
 
 
-def charge_resolution(solution: Solution) -> Iterator[Remark]:
+def charge_resolution(solution: Results) -> Iterator[Remark]:
     """Warn of a charge that rises in front of the closed gap within less than two elements."""
     problem, width = solution.problem, solution.conduction_ramp
     conductor, spacing = problem.interface.foundation.conductor, problem.scales.spacing
@@ -394,7 +394,7 @@ def own_shape(problem: ContactProblem) -> Iterator[Remark]:
             )
 
 
-def beyond_part(solution: Solution) -> Iterator[Remark]:
+def beyond_part(solution: Results) -> Iterator[Remark]:
     """Warn of contact that goes on where its part, or the map of heights, ends. Collective."""
     problem, d = solution.problem, solution.problem.dim
     if any(isinstance(contact.foundation, Heights) for contact in problem.contacts):
@@ -459,7 +459,7 @@ def beyond_heights(problem: ContactProblem, touched: NDArray[np.bool_]) -> Itera
                 )
 
 
-def coarse_curves(solution: Solution) -> Iterator[Remark]:
+def coarse_curves(solution: Results) -> Iterator[Remark]:
     """Warn of straight facets of a curved surface whose deviation decides gaps or pressures."""
     problem, nodes = solution.problem, solution.problem.nodes
     yield from rounded_overlaps(problem, solution.state)
@@ -520,7 +520,7 @@ def rounded_overlaps(problem: ContactProblem, state: State | None = None) -> Ite
             )
 
 
-def _straight_edges(solution: Solution, closed: NDArray[np.bool_]) -> Iterator[Remark]:
+def _straight_edges(solution: Results, closed: NDArray[np.bool_]) -> Iterator[Remark]:
     """Warn of straight edges of degree 2, whose gaps are those of fitted curves. Collective.
 
     The pressure that flattens waves of the height u and the length 2 h is pi E' u/(4 h) (Johnson,
@@ -544,7 +544,7 @@ def _straight_edges(solution: Solution, closed: NDArray[np.bool_]) -> Iterator[R
         )
 
 
-def _turn(solution: Solution, closed: NDArray[np.bool_]) -> float:
+def _turn(solution: Results, closed: NDArray[np.bool_]) -> float:
     """Return h/R of straight edges that touch, or of contact directions at corners. Collective."""
     problem, domain = solution.problem, solution.problem.domain
     nodes, space = problem.nodes, problem.body.space

@@ -87,7 +87,7 @@ class StepRecorder:
         """Return the record of a step that follows the last one. Collective."""
         problem = self._problem.at(state.time, state.history)
         self._before = energies = balance(problem, state, self._before)
-        solution = Solution(problem, state, outcome, [*outcome.records], outcome.counters, "", {})
+        solution = Results(problem, state, outcome, [*outcome.records], outcome.counters, "", {})
         solution.energies = energies
         if self._driven is not None:
             way = np.array([mean(problem, state) for mean in self._ways])
@@ -98,7 +98,7 @@ class StepRecorder:
 
 
 @dataclass(repr=False)
-class Solution:
+class Results:
     """The solution of a problem, or the state at which its method has ended.
 
     Nodal quantities are those of the contact nodes that this rank owns, in the order of

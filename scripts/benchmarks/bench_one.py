@@ -26,7 +26,7 @@ from contact.case.mesh import Mesh
 from contact.linear.operator import SparseOperator
 from contact.problem.problem import ContactProblem
 from contact.refining import default_start
-from contact.results.solution import Solution
+from contact.solution import Solution
 from scripts.cases import CASES, bar
 
 COMM = MPI.COMM_WORLD

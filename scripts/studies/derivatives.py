@@ -15,7 +15,7 @@ import numpy as np
 from contact import field_gradient, gap_gradient, parse_case, sensitivity
 from contact.case.file import number_at, to_toml
 from contact.results.quantities import named_functionals
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.typing import Array
 from forms.elasticity import hexagonal
 from forms.piezo import hexagonal_voigt

@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from contact import identify, load_case, sensitivity
 from contact.case.file import Case, number_at, with_number
 from contact.cli.identify import draw
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, append, empty, solved

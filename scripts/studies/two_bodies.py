@@ -12,7 +12,7 @@ import numpy as np
 
 from contact import load_case, parse_case
 from contact.results.contact_nodes import Table, contact_table
-from contact.results.solution import Solution
+from contact.solution import Solution
 from scripts.cases import CASES
 from scripts.reporting import Report, append, empty, solved
 from scripts.studies.curved_foundations import ratios, two_rings

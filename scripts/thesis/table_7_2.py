@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from contact import Case, NotConvergedError, build_problem, solve
 from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
-from contact.results.solution import Solution
+from contact.solution import Solution
 from scripts.cases import bar
 from scripts.reporting import Report, empty, observed_orders, solved
 from scripts.studies.error_norms import DualNorm, errors

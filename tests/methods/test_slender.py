@@ -16,7 +16,7 @@ from contact.mesh.grid import rectangle
 from contact.methods import fallbacks, newton
 from contact.methods.report import Outcome
 from contact.problem.residuals import evaluate
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.thesis.fixed_point import FixedPoint
 from contact.thesis.softest_mode import softest_mode
 from tests.problems.clamped import clamped

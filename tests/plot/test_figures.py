@@ -20,7 +20,7 @@ from contact.plot.run import Run, read_run, read_step
 from contact.plot.series import draw_loop
 from contact.plot.style import unit_of
 from contact.results.options import OutputOptions, Units
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.solving import solve
 from contact.writing import write_outputs, written
 from scripts.cases import CASES

@@ -24,7 +24,7 @@ from contact.model.obstacle import GapFunction, Plane
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.fields import DerivedFields
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from contact.case.file import Case, parse_case
 from contact.methods.options import NewtonOptions, Options
 from contact.results.resultants import movements
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.solving import solve
 
 #: Class 6mm of the thesis, in GPa, C/m2, nF/m.

@@ -21,7 +21,7 @@ from contact.derivatives.by_parameters import (
     sensitivity,
 )
 from contact.results.quantities import named_functionals
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.typing import Array
 from tests.problems.rigid import PIEZO
 

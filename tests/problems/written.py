@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 from contact.case.file import Case, parse_case
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.writing import write_outputs
 from tests.problems.rigid import PIEZO
 
