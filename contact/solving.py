@@ -174,7 +174,7 @@ def solve_steps(
     """
     expect("solve_steps", problem, "a Problem", isinstance(problem, ContactProblem))
     _check_types(settings, monitor)
-    for record in kept:
+    for record in kept[-1:]:
         _check_state("kept", problem, record.state)
     ends = _checked_times(problem, times, 0.0)
     steps = partial(solve_in_steps, times=(0.0, *ends), kept=kept, keep=keep)

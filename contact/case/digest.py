@@ -20,7 +20,7 @@ from contact.model.section import FilePath, walk
 #: Key of the mesh file.
 MESH = "mesh.file"
 
-#: Keys of files: their contents are compared by digests, and their folders may differ.
+#: Keys of files.
 FILES = ("file", "library")
 
 #: Sections that say how a problem is solved and shown, not which one it is.
@@ -93,8 +93,16 @@ def _differences(before: Any, now: Any, path: str = "") -> Iterator[str]:
                 yield f"{place} is {'given' if key in before else 'missing'}"
             else:
                 yield from _differences(before[key], now[key], place)
-    elif path.rpartition(".")[2] in FILES and isinstance(before, str) and isinstance(now, str):
-        if Path(before).name != Path(now).name:
-            yield f"{path} is {shown(before)}, here {shown(now)}"
     elif before != now and not (before != before and now != now):
-        yield f"{path} is {shown(before)}, here {shown(now)}"
+        if path.rpartition(".")[2] not in FILES or not _may_be_one(str(before), str(now)):
+            yield f"{path} is {shown(before)}, here {shown(now)}"
+
+
+def _may_be_one(before: str, now: str) -> bool:
+    """Tell whether paths may be of one file: a relative one ends another as seen elsewhere."""
+    if os.path.isabs(before) and os.path.isabs(now):
+        return False
+    short, long = sorted(
+        ([part for part in Path(path).parts if part != ".."] for path in (before, now)), key=len
+    )
+    return bool(short) and long[-len(short) :] == short

@@ -151,6 +151,9 @@ def test_a_complete_run_may_be_run_again_and_go_on_anywhere(tmp_path, monkeypatc
     assert on_the_line("solve", "--restart", "out") == 0
     monkeypatch.chdir("/")
     assert on_the_line("solve", tmp_path / "case.toml", "--out", tmp_path / "out") == 0
+    # A file of this name in another folder is another one.
+    other = shutil.copytree(tmp_path, tmp_path / "other", ignore=shutil.ignore_patterns("out"))
+    assert on_the_line("solve", other / "case.toml", "--out", tmp_path / "out") == 2
 
 
 def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd):
