@@ -1,6 +1,5 @@
 """The public names: for type checkers, and for `contact/__init__.py`, which imports them lazily."""
 
-from contact.body.description import Body as Body
 from contact.case.build import build_problem as build_problem
 from contact.case.file import Case as Case
 from contact.case.file import load_case as load_case
@@ -19,6 +18,7 @@ from contact.mesh.reader import from_msh as from_msh
 from contact.methods.options import FixedPointOptions as FixedPointOptions
 from contact.methods.options import NewtonOptions as NewtonOptions
 from contact.methods.options import PenaltyOptions as PenaltyOptions
+from contact.model.body import Body as Body
 from contact.model.body import Bolt as Bolt
 from contact.model.body import Elastic as Elastic
 from contact.model.body import Electrode as Electrode

@@ -13,7 +13,6 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact._compat import lasting
-from contact.body.description import Body
 from contact.body.elements import Pointwise, kinematics_of, quadrature_degree, rules_of
 from contact.body.global_unknowns import Cuts
 from contact.body.internal_variables import QuadratureLaws
@@ -23,6 +22,7 @@ from contact.body.supports import elastic_supports_of
 from contact.body.weak_form import Fields, Term, WeakForm
 from contact.mesh.domain import Domain, compiled
 from contact.mesh.entities import Indices
+from contact.model.body import Body
 from contact.model.fields import constant
 from contact.ranks import summed
 from contact.typing import Array

@@ -29,7 +29,6 @@ from ufl.core.expr import Expr
 
 from contact._compat import destroy_unused
 from contact.body.assembly import Assembly
-from contact.body.description import Body
 from contact.body.elements import STANDARD, Pointwise, check_element
 from contact.body.global_unknowns import Cuts, GlobalUnknowns, make_global_unknowns
 from contact.body.loads import Loads, assembled
@@ -51,6 +50,7 @@ from contact.mesh.entities import (
     with_ghosts,
 )
 from contact.mesh.geometry import areas, geometry_nodes, volumes
+from contact.model.body import Body
 from contact.ranks import summed
 from contact.tolerances import MOST_ROUNDING, POSITIONS, POSITIONS_KNOWN, TOUCHING
 from contact.typing import Array

@@ -23,11 +23,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from contact.body.description import Body
 from contact.errors import InputError
 from contact.mesh.domain import Domain, members
 from contact.mesh.entities import Indices, cell_facets, distributed_components, sums_at
-from contact.model.body import Bolt, Electrode
+from contact.model.body import Body, Bolt, Electrode
 from contact.model.rigid import Rigid, numbers_at, rigid_motions
 from contact.ranks import summed
 from contact.settings import Fault

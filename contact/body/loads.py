@@ -17,12 +17,11 @@ from ufl.core.expr import Expr
 from ufl.corealg.traversal import traverse_unique_terminals
 
 from contact.arguments import check_finite, naming, real
-from contact.body.description import Body
 from contact.body.weak_form import LoadDensity, Term
 from contact.errors import InputError
 from contact.mesh.domain import Domain, compiled
 from contact.mesh.geometry import area
-from contact.model.body import Load
+from contact.model.body import Body, Load
 from contact.model.fields import Factor, Field, Moving, at_time, constant
 from contact.model.formula import is_zero
 from contact.ranks import on_all_ranks, summed

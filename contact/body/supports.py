@@ -14,7 +14,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact._compat import collapse, lasting
-from contact.body.description import Body
 from contact.body.loads import expression
 from contact.body.weak_form import ElasticSupport
 from contact.errors import InputError
@@ -23,6 +22,7 @@ from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, on_axis
 from contact.mesh.entities import sums_at
 from contact.mesh.geometry import facet_normals
+from contact.model.body import Body
 from contact.model.fields import Factor, Field, Moving, steady, values_at
 from contact.model.formula import Expression
 from contact.ranks import on_all_ranks

@@ -9,12 +9,11 @@ from typing import Any, TypedDict, TypeVar
 from mpi4py import MPI
 
 from contact.arguments import check_range
-from contact.body.description import Body
 from contact.case.checks import check_mesh
 from contact.case.file import Case
 from contact.errors import InputError
 from contact.mesh.domain import Domain, revolved
-from contact.model.body import Bolt, Electrode, Fixed, Load
+from contact.model.body import Body, Bolt, Electrode, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.foundation import Electric, Layer
 from contact.model.friction import Friction

@@ -7,9 +7,9 @@ from typing import Any, TypeAlias
 
 from contact.errors import nearest, shown
 from contact.mesh.domain import meet, members
-from contact.model.body import ZERO, Bolt, Electrode, Fixed, Load
+from contact.model.body import Bolt, Electrode, Fixed, Load
 from contact.model.fields import CONSTANT
-from contact.model.formula import Expression
+from contact.model.formula import ZERO, Expression
 from contact.model.messages import listed
 from contact.model.rigid import Motion
 from contact.model.section import walk

@@ -1,13 +1,16 @@
-"""Supports, loads, electrodes and bolts of a body: made in Python, or read from a case file."""
+"""A body: its materials, supports, loads, rigid parts, electrodes and bolts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import model_validator
 
-from contact.arguments import OfTime, one_of
+from contact.arguments import OfTime, expect, fill, one_of, several
+from contact.errors import InputError
 from contact.model.fields import (
     Factor,
     Field,
@@ -21,7 +24,9 @@ from contact.model.fields import (
     amplitude_of,
     knows_time,
 )
-from contact.model.formula import Expression
+from contact.model.formula import ZERO, Expression
+from contact.model.material import Material
+from contact.model.rigid import Rigid
 from contact.model.section import (
     Described,
     FactorOfTime,
@@ -35,8 +40,10 @@ from contact.model.section import (
     Values,
 )
 from contact.settings import Accepted, Switch, Words, fault
-
-ZERO = Expression(0.0)
+from forms.elasticity import Anisotropic
+from forms.hencky import Law, is_linear
+from forms.history import HistoryLaw
+from forms.piezo import Piezo
 
 
 class Fixed(Described):
@@ -329,3 +336,127 @@ class Bolt(Described):
     def forces(self) -> tuple[Expression | OfTime | None, ...]:
         """The section force."""
         return (self.force,)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body, or several: materials, supports and loads.
+
+    Parameters
+    ----------
+    materials
+        A law of the stress, a `Material`, or several of them with their regions.
+    fixed, loads
+        Supports and loads, one or several; the attributes are tuples, as those below.
+    piezo
+        Piezoelectric tensors in the body's axes, beside a law.
+    rigid, electrodes
+        Rigid parts, and parts of one unknown potential.
+    elastic
+        Elastic supports.
+    bolts
+        Cuts whose sides are drawn together.
+
+    Raises
+    ------
+    InputError
+        If something else is given, a law beside several materials, a bolt in a body with internal
+        variables, or an electrode on one without coupling.
+    """
+
+    materials: tuple[Material, ...]
+    fixed: tuple[Fixed, ...]
+    loads: tuple[Load, ...]
+    rigid: tuple[Rigid, ...]
+    electrodes: tuple[Electrode, ...]
+    elastic: tuple[Elastic, ...]
+    bolts: tuple[Bolt, ...]
+
+    def __init__(
+        self,
+        materials: Law | Material | Sequence[Material],
+        fixed: Fixed | Sequence[Fixed],
+        loads: Load | Sequence[Load] = (),
+        piezo: Piezo | None = None,
+        rigid: Rigid | Sequence[Rigid] = (),
+        electrodes: Electrode | Sequence[Electrode] = (),
+        elastic: Elastic | Sequence[Elastic] = (),
+        bolts: Bolt | Sequence[Bolt] = (),
+    ) -> None:
+        if not isinstance(materials, Material | Sequence):
+            materials, piezo = Material(materials, piezo), None
+        accepted = "a law, Material(law), or a list of Material(law, on=region)"
+        every = several("law", materials, Material, accepted)
+        expect("law", materials, accepted, every and piezo is None)
+        fill(self, materials=every)
+        for name, given, kind in (
+            ("fixed", fixed, Fixed),
+            ("loads", loads, Load),
+            ("rigid", rigid, Rigid),
+            ("electrodes", electrodes, Electrode),
+            ("elastic", elastic, Elastic),
+            ("bolts", bolts, Bolt),
+        ):
+            words = f"{kind.__name__}(...), or a list of them"
+            fill(self, **{name: several(name, given, kind, words)})
+        if self.bolts and any(isinstance(one.law, HistoryLaw) for one in self.materials):
+            raise InputError(
+                f"bolt on {self.bolts[0].on!r}: a material of the body has internal variables, as "
+                "flow theory has; accepted: materials without internal variables where a bolt is",
+                "bolt",
+            )
+        fits = not self.electrodes or self.piezo is not None
+        expect("electrodes", self.electrodes, "electrodes of a piezoelectric material", fits)
+
+    @property
+    def law(self) -> Law:
+        """The law of the softest material, which determines the scales of the problem."""
+        return min((material.law for material in self.materials), key=lambda law: law.young)
+
+    @property
+    def piezo(self) -> Piezo | None:
+        """The first of the piezoelectric tensors, which determines the unit of the potential."""
+        tensors = (material.piezo for material in self.materials)
+        return next((given for given in tensors if given is not None), None)
+
+    def in_space(self, dim: int) -> Body:
+        """Return the body with its materials in its axes, in 2-D or 3-D."""
+        return replace(self, materials=tuple(one.in_body(dim) for one in self.materials))
+
+    @property
+    def linear(self) -> bool:
+        """Whether the stress is a linear function of the strain."""
+        return all(is_linear(material.law) for material in self.materials)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether its tangent is a symmetric matrix."""
+        return all(getattr(material.law, "symmetric", True) for material in self.materials)
+
+    @property
+    def phi_scale(self) -> float:
+        """Unit of the potential in the unknowns, sqrt(mu1/beta): both blocks are then alike."""
+        if self.piezo is None:
+            return 1.0
+        permittivity = float(np.trace(np.asarray(self.piezo.beta))) / 3
+        return float(np.sqrt(self.law.shear / permittivity))
+
+    def check(self, dim: int) -> None:
+        """Refuse constants that are none of a material, or none of a plane body."""
+        for material in self.materials:
+            young, poisson = float(material.law.young), float(material.law.poisson)
+            if not ((young > 0 and -1 < poisson < 0.5) or isinstance(material.law, Anisotropic)):
+                raise InputError(
+                    f"material: given Young's modulus {young:g} and Poisson's ratio {poisson:g}; "
+                    "accepted: a modulus > 0, a ratio between -1 and 0.5, both excluded",
+                    "material-constants",
+                )
+            for name, tensors in (("", material.law), ("piezoelectric ", material.piezo)):
+                if not isinstance(tensors, Anisotropic | Piezo):
+                    continue
+                try:
+                    tensors.check()
+                    if dim == 2:
+                        tensors.check_plane()
+                except ValueError as error:
+                    raise InputError(f"{name}material: {error}", "material-constants") from error

@@ -14,9 +14,8 @@ from pydantic import Discriminator, Field, Tag, WithJsonSchema, model_validator
 from contact.arguments import expect, one_of
 from contact.errors import shown
 from contact.mesh.domain import Domain
-from contact.model.body import ZERO
 from contact.model.fields import Static
-from contact.model.formula import Expression
+from contact.model.formula import ZERO, Expression
 from contact.model.foundation import Conductor, Electric, Layer
 from contact.model.friction import Friction
 from contact.model.messages import either

@@ -277,3 +277,7 @@ def _translated(node: ast.expr) -> ast.expr:
                 )
             return ast.Call(function, translated, [])
     raise InputError(f"{ast.unparse(node)[:40]} is not accepted; accepted: {ACCEPTED}", "formula")
+
+
+#: Default of components, forces, gaps and the like.
+ZERO = Expression(0.0)

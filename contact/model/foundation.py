@@ -16,9 +16,8 @@ from contact.arguments import SAMPLES, check_slope, expect, naming, real
 from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import area, volume
-from contact.model.body import ZERO
 from contact.model.fields import GivenAmplitude, GivenTimed, amplitude_of
-from contact.model.formula import as_number
+from contact.model.formula import ZERO, as_number
 from contact.model.section import Described, FactorOfTime, Timed
 from contact.settings import NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array

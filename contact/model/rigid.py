@@ -15,9 +15,8 @@ from pydantic import (
 )
 
 from contact.arguments import OfTime, expect
-from contact.model.body import ZERO
 from contact.model.fields import Factor, GivenAmplitude, GivenTimed, amplitude_of
-from contact.model.formula import Expression, as_number
+from contact.model.formula import ZERO, Expression, as_number
 from contact.model.section import (
     IN_PYTHON,
     Described,

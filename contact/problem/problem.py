@@ -11,7 +11,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.arguments import expect, several
-from contact.body.description import Body
 from contact.body.elements import STANDARD
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.global_unknowns import GlobalUnknowns
@@ -38,6 +37,7 @@ from contact.linear.transformation import Transformation, TransformedOperator
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
 from contact.mesh.geometry import area, volume
+from contact.model.body import Body
 from contact.model.contact import Contact, check_laws
 from contact.model.foundation import Conductor, Electric
 from contact.model.friction import Friction

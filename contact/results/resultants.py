@@ -17,12 +17,11 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.description import Body
 from contact.body.loads import Loads
 from contact.errors import InputError
 from contact.mesh.domain import compiled, members
 from contact.mesh.geometry import area
-from contact.model.body import Bolt, Electrode
+from contact.model.body import Body, Bolt, Electrode
 from contact.model.fields import knows_time, steady
 from contact.model.formula import is_zero
 from contact.problem.problem import ContactProblem

@@ -9,11 +9,10 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve as solve_case
-from contact.body.description import Body
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
-from contact.model.body import Fixed
+from contact.model.body import Body, Fixed
 from contact.model.contact import Contact
 from contact.model.foundation import Layer
 from contact.model.friction import Friction

@@ -9,7 +9,6 @@ from mpi4py import MPI
 from scipy.spatial import Delaunay
 
 from contact import Contact, Problem
-from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.segments import clipped
@@ -18,7 +17,7 @@ from contact.mesh.cells import INTERVAL, QUADRILATERAL, TRIANGLE, rule
 from contact.mesh.deviation import deviations
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import box, rectangle
-from contact.model.body import Fixed
+from contact.model.body import Body, Fixed
 from forms.hencky import Linear
 from tests.problems.mechanics import constant
 from tests.problems.meshes import midpoints

@@ -5,14 +5,13 @@ import pytest
 from dolfinx import mesh
 from mpi4py import MPI
 
-from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
-from contact.model.body import Fixed, Load
+from contact.model.body import Body, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Level, Plane, Sphere

@@ -13,7 +13,6 @@ import pytest
 from mpi4py import MPI
 
 from contact import Problem, build_problem, evolve, solve
-from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.mesh.geometry import geometry_nodes
 from contact.mesh.grid import rectangle
@@ -22,7 +21,7 @@ from contact.methods.method import METHODS
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.methods.report import Outcome
-from contact.model.body import Fixed, Load
+from contact.model.body import Body, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.material import Material

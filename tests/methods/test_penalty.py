@@ -7,13 +7,12 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve
-from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.mesh import grid as domain
 from contact.methods.options import FixedPointOptions, PenaltyOptions
-from contact.model.body import Fixed, Load
+from contact.model.body import Body, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.formula import Expression
 from contact.model.friction import Friction

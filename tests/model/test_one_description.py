@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,12 +17,14 @@ from contact import (
     Friction,
     Layer,
     Linear,
+    Load,
     Material,
     Motion,
     Plane,
     Problem,
     Rigid,
     ShiftedConductivity,
+    make_material,
     parse_case,
     solve,
 )
@@ -83,6 +86,16 @@ def test_objects_stand_for_keys() -> None:
     assert one.contact_force == pytest.approx(other.contact_force, rel=1e-10)
     assert one.charges.foundation == pytest.approx(other.charges.foundation, rel=1e-10)
     assert abs(one.charges.foundation) > 0
+
+
+def test_law_and_coupling_of_a_body_are_those_of_its_materials() -> None:
+    """Also of other ones in its place: the softest law, the first tensors."""
+    body = Body(Linear(10.0, 0.3), Fixed("top", [0.0, 0.0]))
+    assert body.materials == (Material(Linear(10.0, 0.3)),) and body.piezo is None
+    crystal = make_material(2, name="PZT-4", units="GPa", on="left")
+    other = replace(body, materials=[crystal, Material(Linear(1.0, 0.3), on="right")])
+    assert other.law == Linear(1.0, 0.3) and other.piezo == crystal.piezo
+    assert replace(other, loads=Load("top", [0.0, -1.0])).materials == other.materials
 
 
 def test_foundations_move_by_the_contact() -> None:

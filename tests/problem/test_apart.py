@@ -19,7 +19,6 @@ from contact.problem.state import State
 from contact.results.remarks import rounding, untouched
 from contact.solving import solve, solve_steps
 from contact.solving import solve as solve_case
-from forms.hencky import Linear
 from tests.problems.apart import blocks, pressed
 from tests.problems.clamped import clamped
 from tests.problems.mechanics import bar, pressed_block, turn
@@ -107,7 +106,6 @@ def test_charges_of_each_body():
         blocks(MPI.COMM_SELF),
         0.01,
         0.01 * LITTLE,
-        law=Linear(1.0, 0.3),
         piezo=pzt(2),
         fixed=supports,
     )

@@ -11,13 +11,12 @@ import pytest
 from mpi4py import MPI
 
 from contact import write_outputs
-from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.model.body import Fixed
+from contact.model.body import Body, Fixed
 from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.rigid import Motion, Rigid

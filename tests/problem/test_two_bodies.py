@@ -7,12 +7,11 @@ import pytest
 from mpi4py import MPI
 
 from contact import Problem, parse_case, solve
-from contact.body.description import Body
 from contact.errors import InputError, SingularError
 from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh
 from contact.methods.options import FixedPointOptions, PenaltyOptions
-from contact.model.body import Fixed, Load
+from contact.model.body import Body, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.material import Material

@@ -39,7 +39,7 @@ def blocks(comm: MPI.Intracomm, heights: Sequence[float] = (1.0, 3.0), n: int = 
 
 def pressed(domain: Domain, *tractions: float, mu: float = 0.3, gap: float = 0.0, **of_body):
     """Return the problem of blocks on a foundation, pressed by a traction each."""
-    given = {"law": Linear(1.0, 0.3), "fixed": [Fixed("held", [0.0, 0.0])], **of_body}
+    given = {"materials": Linear(1.0, 0.3), "fixed": [Fixed("held", [0.0, 0.0])], **of_body}
     loads = [Load(f"top{k}", traction=[0.0, -size]) for k, size in enumerate(tractions)]
     friction = Friction(ConstantCoefficient(mu)) if mu > 0 else Friction()
     return ContactProblem(

@@ -7,7 +7,6 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.case.file import Case
 from contact.history import History
@@ -17,7 +16,7 @@ from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, Options
 from contact.methods.report import Outcome
-from contact.model.body import Fixed, Load
+from contact.model.body import Body, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Plane

@@ -9,11 +9,10 @@ from dolfinx.fem.petsc import assemble_vector
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.history import BodyState
 from contact.mesh.grid import rectangle
-from contact.model.body import Fixed
+from contact.model.body import Body, Fixed
 from forms.hencky import Linear
 
 

@@ -13,7 +13,6 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact import parse_case, solve, write_outputs
-from contact.body.description import Body
 from contact.body.weak_form import LoadDensity
 from contact.case.build import build_problem
 from contact.case.mesh import Adapt
@@ -26,7 +25,7 @@ from contact.mesh.grid import box, rectangle
 from contact.mesh.transfer import carry
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.model.body import Fixed
+from contact.model.body import Body, Fixed
 from contact.model.contact import Contact
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem

@@ -14,12 +14,11 @@ import pytest
 from mpi4py import MPI
 
 from contact import FixedPointOptions, InputError, PenaltyOptions, build_problem, load_case, solve
-from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.interface.multipliers import Multipliers
 from contact.mesh.contents import Contents
 from contact.methods.options import NewtonOptions
-from contact.model.body import Fixed, Load
+from contact.model.body import Body, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem

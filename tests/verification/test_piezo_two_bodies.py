@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.model.body import Electrode, Fixed
+from contact.model.body import Body, Electrode, Fixed
 from contact.model.contact import Contact
 from contact.model.foundation import Conductor
 from contact.model.material import Material
@@ -50,11 +49,8 @@ def columns(
         Material(Linear(1.0, 0.3), from_voigt(np.zeros((3, 6)), beta * np.eye(3)), (name,))
         for name, beta in (("upper", UPPER), ("lower", LOWER))
     ]
-    body = Body(materials, fixed)
-    if electrode is not None:
-        body = Body(
-            body.law, fixed, (), body.piezo, body.regions, (), (Electrode("top", electrode),)
-        )
+    electrodes = () if electrode is None else Electrode("top", electrode)
+    body = Body(materials, fixed, electrodes=electrodes)
     # Without a fixed potential what touches has to conduct before it is pressed.
     law = PerfectConductivity(conductance)
     conducts = law if electrode is None else ShiftedConductivity(conductance, 1e3)

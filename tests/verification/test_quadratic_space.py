@@ -5,10 +5,9 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve
-from contact.body.description import Body
 from contact.mesh.grid import box
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.model.body import Fixed
+from contact.model.body import Body, Fixed
 from contact.model.contact import Contact
 from contact.model.obstacle import Sphere
 from contact.problem.problem import ContactProblem
