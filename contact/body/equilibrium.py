@@ -13,9 +13,10 @@ another body any error of one may be small. Their norms are by connected compone
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,7 @@ from contact.mesh.entities import (
 )
 from contact.mesh.geometry import areas, geometry_nodes, volumes
 from contact.model.body import Body
+from contact.model.rigid import Motion
 from contact.ranks import summed
 from contact.tolerances import MOST_ROUNDING, POSITIONS, POSITIONS_KNOWN, TOUCHING
 from contact.typing import Array
@@ -137,22 +139,22 @@ def component_norms_of(
     components: tuple[NDArray[np.int32], int],
 ) -> ComponentNorms:
     """Return the norms of a body of given connected components. Collective."""
-    (component, count), members, d = components, global_unknowns.members, domain.dim
-    if count > 1 and members:
-        touched = np.zeros((len(members), count), dtype=np.intc)
-        for member, at in zip(members, touched, strict=True):
-            if member.free.any():
-                facets = domain.facets_anywhere(member.description.on)
+    (component, count), groups, d = components, global_unknowns.groups, domain.dim
+    if count > 1 and groups:
+        touched = np.zeros((len(groups), count), dtype=np.intc)
+        for group, at in zip(groups, touched, strict=True):
+            if group.free.any():
+                facets = domain.facets_anywhere(group.part)
                 nodes = fem.locate_dofs_topological(space, d - 1, facets)
                 at[component[nodes[nodes < component.size]]] = 1
         domain.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
-        member_of, piece_of = np.nonzero(touched)
+        group_of, piece_of = np.nonzero(touched)
         # A part with a given motion has reactions of its own, and joins nothing.
-        count, label = graph_components(member_of, len(members) + piece_of, len(members) + count)
-        component, of_members = label[len(members) + component], label[: len(members)]
+        count, label = graph_components(group_of, len(groups) + piece_of, len(groups) + count)
+        component, of_groups = label[len(groups) + component], label[: len(groups)]
     else:
-        of_members = np.zeros(len(members), dtype=np.intp)
-    behind = np.repeat(of_members, [member.free.size for member in members]).astype(np.intp)
+        of_groups = np.zeros(len(groups), dtype=np.intp)
+    behind = np.repeat(of_groups, [group.free.size for group in groups]).astype(np.intp)
     block_size = space.dofmap.index_map_bs
     return ComponentNorms(
         domain.comm,
@@ -168,14 +170,20 @@ def component_norms_of(
 class BodyEquilibrium:
     """Space, boundary conditions and weak forms of one body.
 
-    The Lagrange elements are of degree 1 or 2, `element` is one of `contact.body.elements`. Refuses
-    missing parts, vectors of the wrong length, and materials, degrees and elements that are none.
+    The Lagrange elements are of degree 1 or 2, `element` is one of `contact.body.elements`.
+    `foundations` are the motions of those that move, by the parts in front of them. Refuses missing
+    parts, vectors of the wrong length, and materials, degrees and elements that are none.
     """
 
     rounding_limit = MOST_ROUNDING
 
     def __init__(
-        self, domain: Domain, body: Body, degree: int = 1, element: str = STANDARD
+        self,
+        domain: Domain,
+        body: Body,
+        degree: int = 1,
+        element: str = STANDARD,
+        foundations: Mapping[str, Motion] = MappingProxyType({}),
     ) -> None:
         body.check(domain.dim)
         check_element(element, degree, shape_of(domain.mesh), domain.order)
@@ -201,7 +209,9 @@ class BodyEquilibrium:
         #: Mask of the owned nodal unknowns without support, shape (nodes, block size).
         self.unsupported = free_components(self.space, self.supports)
         self.rollers = Rollers(domain, self.space, body, self.unsupported)
-        self.global_unknowns = make_global_unknowns(domain, self.space, body, self.unsupported)
+        self.global_unknowns = make_global_unknowns(
+            domain, self.space, body, foundations, self.unsupported
+        )
         self.components = connected_components(self.space)
         self.component_norms = component_norms_of(
             domain, self.space, self.global_unknowns, self.components
@@ -366,11 +376,9 @@ class BodyEquilibrium:
         """Return unknowns with the prescribed values at a time. Collective."""
         at, q = self._at.x, self.global_unknowns.prescribe(self.motion(x), time)
         at.array[:] = self.nodal(x).ravel()
-        if self.global_unknowns.tying:
-            owned = at.array[: self.owned]
-            owned[self.global_unknowns.tied.ravel()] = (self.global_unknowns.ties @ q)[
-                self.global_unknowns.tied.ravel()
-            ]
+        if self.global_unknowns.has_tied_nodes:
+            owned, tied = at.array[: self.owned], self.global_unknowns.tied.ravel()
+            owned[tied] = (self.global_unknowns.tied_motion @ q)[tied]
         for support in self.supports:
             support.set(at.array, time)
         self.rollers.set(at.array[: self.owned].reshape(-1, self.block_size), time)

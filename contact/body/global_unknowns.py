@@ -12,7 +12,7 @@ as those of the nodes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,7 +27,7 @@ from contact.errors import InputError
 from contact.mesh.domain import Domain, members
 from contact.mesh.entities import Indices, cell_facets, distributed_components, sums_at
 from contact.model.body import Body, Bolt, Electrode
-from contact.model.rigid import Rigid, numbers_at, rigid_motions
+from contact.model.rigid import Motion, Rigid, numbers_at, rigid_motions
 from contact.ranks import summed
 from contact.settings import Fault
 from contact.tolerances import NEGLIGIBLE
@@ -35,25 +35,27 @@ from contact.typing import Array
 
 
 @dataclass(frozen=True)
-class Member:
-    """A rigid body, an electrode or a bolt with its columns of q, from `begin` on.
+class UnknownGroup:
+    """The unknowns of a rigid body, an electrode or a bolt: columns of q from `begin` on.
 
-    `scale` is the length of a rotation of 1, or the unit of the potential.
+    The description of a foundation is the motion alone; it is in front of its `part`. `scale` is
+    the length of a rotation of 1, or the unit of the potential.
     """
 
-    description: Rigid | Electrode | Bolt
+    description: Motion | Electrode | Bolt
+    part: str
     begin: int
     scale: float
 
     @property
-    def foundation(self) -> bool:
+    def is_foundation(self) -> bool:
         """True for a foundation, without tied nodes."""
-        return isinstance(self.description, Rigid) and self.description.foundation
+        return isinstance(self.description, Motion) and not self.has_tied_nodes
 
     @property
-    def tying(self) -> bool:
+    def has_tied_nodes(self) -> bool:
         """True for a rigid part or an electrode, whose nodes are tied to it."""
-        return not (self.foundation or isinstance(self.description, Bolt))
+        return isinstance(self.description, Rigid | Electrode)
 
     @property
     def columns(self) -> slice:
@@ -63,11 +65,11 @@ class Member:
     @property
     def units(self) -> Array:
         """Translation, rotation, potential or shortening of each unknown of 1."""
-        if not isinstance(self.description, Rigid):
+        motion = self.description
+        if not isinstance(motion, Motion):
             return np.full(1, self.scale)
-        rigid = self.description
-        turns = np.full(len(rigid.turns), 1 / self.scale)
-        return np.concatenate([np.ones(len(rigid.displacement or ())), turns])
+        turns = np.full(len(motion.turns), 1 / self.scale)
+        return np.concatenate([np.ones(len(motion.displacement or ())), turns])
 
     @property
     def free(self) -> NDArray[np.bool_]:
@@ -91,7 +93,7 @@ class Member:
         columns = np.zeros((n, block_size, self.units.size))
         if isinstance(self.description, Electrode):
             columns[:, -1, 0] = 1.0
-        elif isinstance(self.description, Rigid):
+        elif isinstance(self.description, Motion):
             offset = points - np.asarray(self.description.centre)
             columns[:, :d] = rigid_motions(offset) * self.units
         return columns
@@ -105,20 +107,20 @@ class GlobalUnknowns:
     ----------
     comm
         Communicator.
-    members
-        Rigid bodies and electrodes.
+    groups
+        The unknowns of each rigid body, electrode and bolt, foundations first.
     free
         Mask of the unknowns without given values, shape (m,).
-    ties
+    tied_motion
         N_q at the tied owned unknowns, shape (owned, m).
     tied
         Mask of the tied unknowns of owned nodes, shape (nodes, block size).
     """
 
     comm: MPI.Intracomm
-    members: tuple[Member, ...]
+    groups: tuple[UnknownGroup, ...]
     free: NDArray[np.bool_]
-    ties: sparse.csr_array
+    tied_motion: sparse.csr_array
     tied: NDArray[np.bool_]
 
     @property
@@ -129,21 +131,20 @@ class GlobalUnknowns:
     @property
     def mechanical(self) -> NDArray[np.bool_]:
         """Mask of the motions, shape (m,)."""
-        moves = [not isinstance(m.description, Electrode) for m in self.members]
         flags = [
-            np.full(m.free.size, moving) for m, moving in zip(self.members, moves, strict=True)
+            np.full(group.free.size, not isinstance(group.description, Electrode))
+            for group in self.groups
         ]
         return np.concatenate([np.zeros(0, dtype=bool), *flags])
 
     @property
-    def tying(self) -> bool:
+    def has_tied_nodes(self) -> bool:
         """True if there are tied nodes."""
-        return any(member.tying for member in self.members)
+        return any(group.has_tied_nodes for group in self.groups)
 
-    def member(self, part: str) -> Member | None:
+    def foundation(self, part: str) -> UnknownGroup | None:
         """Return the moving foundation in front of a part; None where it is fixed."""
-        foundations = (m for m in self.members if m.foundation and m.description.on == part)
-        return next(foundations, None)
+        return next((one for one in self.groups if one.is_foundation and one.part == part), None)
 
     def of_foundation(
         self, points: Array, block_size: int, part: str | None = None
@@ -155,108 +156,114 @@ class GlobalUnknowns:
         if self.size == 0:
             return None
         motion = np.zeros((len(points), block_size, self.size))
-        member = None if part is None else self.member(part)
-        if member is not None:
-            motion[:, :, member.columns] = member.motion(points, block_size)
+        group = None if part is None else self.foundation(part)
+        if group is not None:
+            motion[:, :, group.columns] = group.motion(points, block_size)
         return motion
 
     def prescribe(self, q: Array, time: float) -> Array:
         """Return q with the given values at a time."""
-        values = [member.prescribed(time) for member in self.members]
+        values = [group.prescribed(time) for group in self.groups]
         return np.where(self.free, q, np.concatenate([np.zeros(0), *values]))
 
     def forces(self, time: float) -> Array:
         """Return the forces and charges on the free ones at a time, shape (m,)."""
-        return np.concatenate([np.zeros(0), *(member.forces(time) for member in self.members)])
+        return np.concatenate([np.zeros(0), *(group.forces(time) for group in self.groups)])
 
     def gathered(self, forces: Array) -> Array:
         """Return the forces on q of those on owned unknowns: N_q^T f, shape (m,). Collective."""
-        if not self.tying:
+        if not self.has_tied_nodes:
             return np.zeros(self.size)
-        return summed(self.comm, self.ties.T @ forces)
+        return summed(self.comm, self.tied_motion.T @ forces)
 
     def with_foundations(self, nodes: NDArray[np.int32], motion: Array) -> sparse.csr_array:
         """Return N_q at tied nodes, and as given, (n, b, m), at contact nodes, shape (owned, m)."""
-        contact_rows = _rows(nodes, motion, slice(0, self.size), self.ties.shape)
-        return (self.ties + contact_rows).tocsr()
+        contact_rows = _rows(nodes, motion, slice(0, self.size), self.tied_motion.shape)
+        return (self.tied_motion + contact_rows).tocsr()
 
 
 def make_global_unknowns(
-    domain: Domain, space: fem.FunctionSpace, body: Body, free: NDArray[np.bool_]
+    domain: Domain,
+    space: fem.FunctionSpace,
+    body: Body,
+    foundations: Mapping[str, Motion],
+    free: NDArray[np.bool_],
 ) -> GlobalUnknowns:
-    """Return the global unknowns of a body, given the mask of free nodal unknowns. Collective.
+    """Return the global unknowns of a body and of the moving foundations in front of parts.
+
+    Given the mask of free nodal unknowns. Collective.
 
     Refuses rigid parts or electrodes that share nodes, and free ones that share nodes with a
     support.
     """
-    members: list[Member] = []
+    groups: list[UnknownGroup] = []
+    size = 0
     described: list[Rigid | Electrode | Bolt] = [*body.rigid, *body.electrodes, *body.bolts]
-    for description in described:
-        if isinstance(description, Rigid):
-            description = _moving(description, domain)
-        begin = members[-1].columns.stop if members else 0
+    for part, given in (*foundations.items(), *((one.on, one) for one in described)):
+        description = _moving(given, part, domain) if isinstance(given, Motion) else given
         scale = body.phi_scale if isinstance(description, Electrode) else domain.size
         scale = 1.0 if isinstance(description, Bolt) else scale
-        members.append(Member(description, begin, scale))
-    size = members[-1].columns.stop if members else 0
-    unknown = np.concatenate([np.zeros(0, dtype=bool), *(member.free for member in members)])
+        groups.append(UnknownGroup(description, part, size, scale))
+        size = groups[-1].columns.stop
+    unknown = np.concatenate([np.zeros(0, dtype=bool), *(group.free for group in groups)])
     tied = np.zeros(free.shape, dtype=bool)
-    ties = sparse.csr_array((free.size, size))
-    for member in members:
-        if member.tying:
-            ties = ties + _tie(domain, space, member, free, tied, size)
-    return GlobalUnknowns(domain.comm, tuple(members), unknown, ties, tied)
+    tied_motion = sparse.csr_array((free.size, size))
+    for group in groups:
+        if group.has_tied_nodes:
+            tied_motion = tied_motion + _tie(domain, space, group, free, tied, size)
+    return GlobalUnknowns(domain.comm, tuple(groups), unknown, tied_motion, tied)
 
 
-def _moving(rigid: Rigid, domain: Domain) -> Rigid:
-    """Return a rigid part with all components of its motion, checked for the dimension."""
-    place = f"{rigid.name} on {rigid.on!r}: "
+def _moving(motion: Motion, part: str, domain: Domain) -> Motion:
+    """Return a motion with all its components, checked for the dimension."""
+    place = f"rigid on {part!r}: "
     for key in ("displacement", "force", "centre"):
-        vector = getattr(rigid, key)
+        vector = getattr(motion, key)
         if vector is not None and len(vector) != domain.dim:
             raise InputError(
                 f"{place}{key} has {len(vector)} components, the body has {domain.dim}",
                 "components",
             )
     try:
-        rigid.check_dimension(domain.dim)
+        motion.check_dimension(domain.dim)
     except Fault as error:
         raise error.within(place) from None
-    if domain.revolved and rigid.off_axis is not None:
+    if domain.revolved and motion.off_axis is not None:
         raise InputError(
-            f"{rigid.name} on {rigid.on!r}: a rigid part moves along the axis alone where space is "
+            f"{place}a rigid part moves along the axis alone where space is "
             "axisymmetric; accepted: 0 for the first component of the displacement, no rotation",
             "rigid-part",
         )
-    return rigid.filled(domain.dim)
+    return motion.filled(domain.dim)
 
 
 def _tie(
     domain: Domain,
     space: fem.FunctionSpace,
-    member: Member,
+    group: UnknownGroup,
     free: NDArray[np.bool_],
     tied: NDArray[np.bool_],
     size: int,
 ) -> sparse.csr_array:
     """Return the rows of N_q of a rigid part or an electrode, and mark them as tied. Collective."""
-    d, key = domain.dim, f"{member.description.name} on {member.description.on!r}"
+    d, electric = domain.dim, isinstance(group.description, Electrode)
+    key = f"{'electrode' if electric else 'rigid'} on {group.part!r}"
     domain.mesh.topology.create_connectivity(d - 1, d)
-    nodes = fem.locate_dofs_topological(space, d - 1, domain.facets_anywhere(member.description.on))
+    nodes = fem.locate_dofs_topological(space, d - 1, domain.facets_anywhere(group.part))
     nodes = nodes[nodes < free.shape[0]]
     points = space.tabulate_dof_coordinates()[nodes, :d]
-    motion = member.motion(points, free.shape[1])
+    motion = group.motion(points, free.shape[1])
     follows = np.zeros((nodes.size, free.shape[1]), dtype=bool)
-    follows[:, slice(d, None) if isinstance(member.description, Electrode) else slice(0, d)] = True
+    follows[:, slice(d, None) if electric else slice(0, d)] = True
     if _anywhere(domain, tied[nodes] & follows):
         raise InputError(
             f"{key}: it shares nodes with another rigid part or electrode; accepted: parts apart",
             "rigid-part",
         )
     # A supported node cannot be tied.
-    moves = np.abs(motion[:, :, member.free]).max(axis=2, initial=0.0) > NEGLIGIBLE
+    moves = np.abs(motion[:, :, group.free]).max(axis=2, initial=0.0) > NEGLIGIBLE
     if _anywhere(domain, moves & follows & ~free[nodes]):
-        if isinstance(member.description, Electrode):
+        if electric:
             raise InputError(
                 f"{key}: it shares nodes with a part whose potential is fixed; accepted: parts "
                 "that share no nodes",
@@ -270,7 +277,7 @@ def _tie(
     follows &= free[nodes]
     tied[nodes] |= follows
     motion[~follows] = 0.0
-    return _rows(nodes, motion, member.columns, (free.size, size))
+    return _rows(nodes, motion, group.columns, (free.size, size))
 
 
 def _rows(
@@ -351,7 +358,7 @@ class Cuts:
         domain: Domain, space: fem.FunctionSpace, unknowns: GlobalUnknowns, body: Body
     ) -> Cuts | None:
         """Return the cuts of a body; None without any. Collective."""
-        places = [m.begin for m in unknowns.members if isinstance(m.description, Bolt)]
+        places = [one.begin for one in unknowns.groups if isinstance(one.description, Bolt)]
         return Cuts(domain, space, places, body) if places else None
 
     @cached_property

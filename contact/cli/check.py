@@ -31,7 +31,7 @@ from contact.mesh.geometry import (
 )
 from contact.methods.options import NewtonOptions
 from contact.model.body import Electrode
-from contact.model.rigid import Rigid
+from contact.model.rigid import Motion
 from contact.problem.checks import expected_displacements, meeting_supports
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
@@ -239,7 +239,7 @@ def acting(problem: ContactProblem) -> list[str]:
     largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
     loads, given = body.external(time), body.prescribe(body.zero_displacement(), time)
     pressed, moved = (x / size for x in expected_displacements(problem, loads, given))
-    rows = [*_resultants(problem, loads, given), *_members(problem)]
+    rows = [*_resultants(problem, loads, given), *_global_unknowns(problem)]
     rows += [
         [f"foundation of {contact.on!r}", f"potential {float(phi):.4g}"]
         for contact in problem.contacts
@@ -295,23 +295,21 @@ def _resultants(problem: ContactProblem, external: Array, prescribed: Array) -> 
     return [[*row] for row, size in rows.items() if size > 0]
 
 
-def _members(problem: ContactProblem) -> list[list[str]]:
+def _global_unknowns(problem: ContactProblem) -> list[list[str]]:
     """Return the given motions and forces of rigid bodies, electrodes and bolts."""
     rows = []
-    for member in problem.body.global_unknowns.members:
-        given, d = member.description, problem.dim
-        names = ["shortening", "force"]
-        where = f"{given.name} {given.on!r}"
-        if isinstance(given, Electrode):
-            names = ["potential", "charge"]
-        if isinstance(given, Rigid):
+    for group in problem.body.global_unknowns.groups:
+        d, kind, names = problem.dim, "bolt", ["shortening", "force"]
+        if isinstance(group.description, Electrode):
+            kind, names = "electrode", ["potential", "charge"]
+        if isinstance(group.description, Motion):
+            kind = "foundation of" if group.is_foundation else "rigid part"
             names = ["displacement", "force", "rotation (radians)", "moment"]
-            where = f"{'foundation of' if given.foundation else 'rigid part'} {given.on!r}"
-        moves = member.prescribed(problem.time) * member.units
-        forces = member.forces(problem.time) / member.units
+        moves = group.prescribed(problem.time) * group.units
+        forces = group.forces(problem.time) / group.units
         values = [moves[:d], forces[:d], moves[d:], forces[d:]]
         rows += [
-            [where, f"{name} {vector(value)}"]
+            [f"{kind} {group.part!r}", f"{name} {vector(value)}"]
             for name, value in zip(names, values, strict=False)
             if np.any(value)
         ]

@@ -254,7 +254,7 @@ def motion_at_constant_jump(nodes: ContactNodes, body: BodyEquilibrium) -> Array
     assert nodes.motion is not None
     moved, coupling = nodes.motion.copy(), nodes.coupling
     if coupling is not None:
-        for k, column in enumerate(body.global_unknowns.ties.toarray().T):
+        for k, column in enumerate(body.global_unknowns.tied_motion.toarray().T):
             moved[coupling.places, :, k] -= coupling.apply(column.reshape(-1, nodes.block_size))
     return np.asarray(_unknowns_by_jumps(nodes, body) @ moved)
 

@@ -319,7 +319,7 @@ def _check_charged(
             "rigid-part",
         )
     any_charged = body.comm.allreduce(bool(fixed_conducting.any()), op=MPI.LOR)
-    if any_charged and body.global_unknowns.member(part) is not None:
+    if any_charged and body.global_unknowns.foundation(part) is not None:
         raise InputError(
             f"{key}.rigid: supports hold nodes of part {part!r}, which carry charge as "
             "the foundation comes near; accepted: a part that can move everywhere",

@@ -272,7 +272,6 @@ class Electrode(Described):
     'left+right'
     """
 
-    name: ClassVar[str] = "electrode"
     values: ClassVar[tuple[None]] = (None,)
 
     on: Part
@@ -299,8 +298,6 @@ class Electrode(Described):
 
 class Bolt(Described):
     """`[[bolt]]`: a cut through a body whose sides are drawn together: a bolt that is tightened."""
-
-    name: ClassVar[str] = "bolt"
 
     on: Part
     """A part inside of the body, all facets of a plane section: a group of a mesh file, or one of

@@ -244,8 +244,7 @@ class Contact(Described):
             "friction": self.friction or friction or Friction(),
             "electric": electric,
         }
-        # The motion of the foundation is one of the body's unknowns.
-        done = {"gap": None, "direction": "foundation", "axis": None, "rigid": None}
+        done = {"gap": None, "direction": "foundation", "axis": None}
         return self.model_copy(update=filled | done)
 
     @property

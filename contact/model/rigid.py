@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from contact.model.section import (
     Timed,
     Vector,
 )
-from contact.settings import Accepted, Internal, Words, fault
+from contact.settings import Accepted, Words, fault
 from contact.typing import Array
 
 #: A component of a motion.
@@ -215,18 +215,13 @@ class Rigid(Motion):
     >>> same = Rigid("top", Motion([0.0, "free"], force=[0.0, -3.0]))
     """
 
-    name: ClassVar[str] = "rigid"
-
     on: Part
     """Part of the boundary, or a list of parts."""
-    foundation: Internal[bool] = False
-    """Whether it is the foundation in front of the part, as ``Contact(rigid=...)`` has it."""
 
     def __init__(
         self,
         on: str | Sequence[str],
         motion: Motion | None = None,
-        foundation: bool = False,
         *,
         displacement: Sequence[GivenFree] | Array = (),
         rotation: Given = (),
@@ -238,7 +233,7 @@ class Rigid(Motion):
         own = Motion(displacement, rotation, force, moment, centre, amplitude)
         fits = motion is None or (isinstance(motion, Motion) and own == Motion())
         expect("Rigid: motion", motion, "Motion(...), or its components", fits)
-        Described.__init__(self, on=on, foundation=foundation, **dict(motion or own))
+        Described.__init__(self, on=on, **dict(motion or own))
 
 
 def numbers_at(

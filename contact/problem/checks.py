@@ -293,7 +293,9 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     raised = np.zeros((*body.free.shape, count))
     raised[np.arange(component.size), -1, component] = 1.0
     electrodes = np.eye(body.global_unknowns.size)[:, ~body.global_unknowns.mechanical]
-    follows = (body.global_unknowns.ties @ electrodes)[body.block_size - 1 :: body.block_size]
+    follows = (body.global_unknowns.tied_motion @ electrodes)[
+        body.block_size - 1 :: body.block_size
+    ]
     rows = [np.hstack([raised[:, -1], -follows])[~body.free[:, -1]]]
     columns = linalg.block_diag(raised.reshape(body.owned, count), electrodes)
     locally = [body.local(column) for column in columns.T]

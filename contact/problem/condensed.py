@@ -211,7 +211,7 @@ class Condensation:
         self.set_load_step(problem)
         body = problem.body
         unknowns = body.global_unknowns
-        none = Transformation(body.layout, None, unknowns.ties, unknowns.free)
+        none = Transformation(body.layout, None, unknowns.tied_motion, unknowns.free)
         self._transformation = problem.transformation or none
         reference = BodyState(body.zero_displacement())
         self._bulk = TransformedBulk(body, self._transformation, reference)

@@ -41,7 +41,6 @@ from contact.model.body import Body
 from contact.model.contact import Contact, check_laws
 from contact.model.foundation import Conductor, Electric
 from contact.model.friction import Friction
-from contact.model.rigid import Rigid
 from contact.problem.state import Scales, State
 from contact.ranks import on_all_ranks
 from contact.typing import Array
@@ -56,14 +55,14 @@ def approached(
     Given local unknowns, and the time of the forces. Collective.
     """
     nodes, forces = interface.nodes, global_unknowns.forces(time)
-    for member in global_unknowns.members:
+    for group in global_unknowns.groups:
         push = np.zeros(global_unknowns.size)
-        push[member.columns] = forces[member.columns]
-        if nodes.motion is None or not member.foundation or not push.any():
+        push[group.columns] = forces[group.columns]
+        if nodes.motion is None or not group.is_foundation or not push.any():
             continue
         normal_gap = interface.normal_gap(nodes.jump(x))
         closing = -nodes.normal_component(nodes.motion @ push)
-        moved = np.abs(nodes.motion[:, :, member.columns]).max(axis=(1, 2), initial=0.0) > 0
+        moved = np.abs(nodes.motion[:, :, group.columns]).max(axis=(1, 2), initial=0.0) > 0
         travel = np.full(normal_gap.size, np.inf)
         closes = moved & (closing > 0)
         travel[closes] = normal_gap[closes] / closing[closes]
@@ -106,7 +105,7 @@ class ContactProblem:
     contacts
         The contacts, each with its friction and conductor.
     description
-        Material, supports and loads, with the rigid foundations that move.
+        Material, supports and loads.
     body
         The bodies: their space, forms, forces and operators.
     placements, geometries
@@ -148,9 +147,7 @@ class ContactProblem:
         contacts = several("contact", contact, Contact, "Contact(part), or several")
         expect("contact", contact, "Contact(part), or several", contacts)
         check_laws("Problem", friction, conductor)
-        moving = [Rigid(c.on, c.rigid, foundation=True) for c in contacts if c.rigid is not None]
-        body = body.in_space(domain.dim)
-        self.description = replace(body, rigid=(*moving, *body.rigid)) if moving else body
+        self.description = body.in_space(domain.dim)
         self.contacts = tuple(one.filled(domain, friction, conductor) for one in contacts)
         names = [contact.name for contact in self.contacts]
         for name in names:
@@ -165,7 +162,8 @@ class ContactProblem:
                 "for the columns stick_nodes and slip_nodes are the numbers of nodes",
                 "contact-name",
             )
-        self.body = BodyEquilibrium(domain, self.description, degree, element)
+        foundations = {c.on: c.rigid for c in self.contacts if c.rigid is not None}
+        self.body = BodyEquilibrium(domain, self.description, degree, element, foundations)
         one = len(self.contacts) == 1
         pairs = {i: (c.on, c.against, c.press) for i, c in enumerate(self.contacts) if c.against}
         pair_depths, self.unpaired = overlap_depths(self.body, [*pairs.values()])
@@ -365,7 +363,7 @@ class ContactProblem:
         None where jumps are nodal values and there are no global unknowns.
         """
         body, nodes = self.body, self.nodes
-        unknowns, motions = body.global_unknowns, body.global_unknowns.ties
+        unknowns, motions = body.global_unknowns, body.global_unknowns.tied_motion
         if nodes.coupling is None and unknowns.size == 0:
             return None
         if nodes.motion is not None:

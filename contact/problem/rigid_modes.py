@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from contact.body.global_unknowns import Pieces
 from contact.interface.nodes import unit_vectors
 from contact.model.body import Bolt
-from contact.model.rigid import Rigid, rigid_motions
+from contact.model.rigid import Motion, rigid_motions
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.tolerances import BALANCED, NEGLIGIBLE
@@ -145,17 +145,17 @@ def unsupported(problem: ContactProblem) -> tuple[Group, ...]:
 
 def _free_motions(problem: ContactProblem) -> dict[int, tuple[str, int]]:
     """Return the free motions among the global unknowns: names, axes of translations, else -1."""
-    members, names = problem.body.global_unknowns.members, NAMES[problem.dim]
+    unknowns, names = problem.body.global_unknowns.groups, NAMES[problem.dim]
     rigid = {
-        member.begin + k: (f"{names[k]} of the rigid part", k if k < problem.dim else -1)
-        for member in members
-        if isinstance(member.description, Rigid)
-        for k in map(int, np.flatnonzero(member.free))
+        one.begin + k: (f"{names[k]} of the rigid part", k if k < problem.dim else -1)
+        for one in unknowns
+        if isinstance(one.description, Motion)
+        for k in map(int, np.flatnonzero(one.free))
     }
     return rigid | {
-        member.begin: (f"shortening of the bolt on {member.description.on!r}", -1)
-        for member in members
-        if isinstance(member.description, Bolt) and member.free.any()
+        one.begin: (f"shortening of the bolt on {one.part!r}", -1)
+        for one in unknowns
+        if isinstance(one.description, Bolt) and one.free.any()
     }
 
 
@@ -167,17 +167,14 @@ def _pieces(problem: ContactProblem) -> Pieces | None:
 
 def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
     """Tell which components a free motion, contact or a cut joins, shape (count,). Collective."""
-    free, nodes, ties = (
-        [*_free_motions(problem)],
-        problem.nodes,
-        problem.body.global_unknowns.ties,
-    )
+    free, nodes = [*_free_motions(problem)], problem.nodes
+    tied_motion = problem.body.global_unknowns.tied_motion
     pieces = _pieces(problem)
     touched = np.zeros(count, dtype=np.intc)
     if free and nodes.motion is not None:
         moves = np.abs(nodes.motion[:, :, free]).max(axis=(1, 2), initial=0.0) > 0
         touched[component[nodes.nodes[moves]]] = 1
-        rows = np.flatnonzero(np.abs(ties[:, free]).sum(axis=1) > 0)
+        rows = np.flatnonzero(np.abs(tied_motion[:, free]).sum(axis=1) > 0)
         touched[component[rows // problem.body.block_size]] = 1
     if nodes.coupling is not None and nodes.coupling.between:
         touched[component[nodes.coupling.local]] = 1
@@ -251,7 +248,7 @@ def _at_supports(problem: ContactProblem, moved: Array) -> Array:
     body, nodes, m = problem.body, problem.body.layout.restrained, moved.shape[1]
     motions = moved[: body.owned].reshape(*body.free.shape, m)[nodes, : body.dim]
     dofs = nodes[:, None] * body.block_size + np.arange(body.dim)
-    follows = body.global_unknowns.ties[dofs.ravel()] @ moved[body.owned :]
+    follows = body.global_unknowns.tied_motion[dofs.ravel()] @ moved[body.owned :]
     nodal = motions - follows.reshape(motions.shape)
     return nodal - np.einsum("nij,njk->nik", body.movable(nodes), nodal)
 
@@ -262,7 +259,7 @@ def _elastic_gram(problem: ContactProblem, moved: Array) -> Array:
     if not problem.description.elastic:
         return np.zeros((size, size))
     tied = body.global_unknowns.tied.ravel()
-    follows = body.global_unknowns.ties @ moved[body.owned :]
+    follows = body.global_unknowns.tied_motion @ moved[body.owned :]
     motions = np.where(tied[:, None], follows, moved[: body.owned])
     forces = np.stack(
         [

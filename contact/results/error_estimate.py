@@ -173,9 +173,9 @@ def _acting_inside(problem: ContactProblem) -> list[str]:
     """Return the parts inside of the body at which something acts, and stresses jump."""
     # At cuts of bolts it is the displacement that jumps.
     body = problem.body
-    unknown = [member.description for member in body.global_unknowns.members]
-    acting = [*body.description.fixed, *(one for one in unknown if not isinstance(one, Bolt))]
-    parts = dict.fromkeys(name for one in acting for name in members(one.on))
+    groups = [one for one in body.global_unknowns.groups if not isinstance(one.description, Bolt)]
+    acting = [*(fixed.on for fixed in body.description.fixed), *(group.part for group in groups)]
+    parts = dict.fromkeys(name for part in acting for name in members(part))
     return [name for name in parts if name in problem.domain.inside]
 
 

@@ -24,7 +24,7 @@ from contact.body.loads import assembled
 from contact.mesh.contents import in_space
 from contact.mesh.domain import compiled
 from contact.model.body import Bolt, Electrode
-from contact.model.rigid import Rigid
+from contact.model.rigid import Motion
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import dissipated, residual_forces
 from contact.problem.state import State
@@ -371,22 +371,22 @@ def charges(problem: ContactProblem) -> Functionals:
         found["charge_foundation"] = FoundationCharge()
         for part in holding(problem, electric=True):
             found[f"charge_{part}"] = Reaction(partial(_on_electrode, part=part))
-    for index, part in _members(problem, Electrode):
+    for index, part in _groups(problem, Electrode):
         found[f"charge_{part}"] = _acting(index, 0)
     return found
 
 
-def of_members(problem: ContactProblem, kind: type, name: str) -> Functionals:
+def of_groups(problem: ContactProblem, kind: type, name: str) -> Functionals:
     """Return the unknowns of all electrodes, or of all bolts."""
     return {
         f"{name}_{part}": Weighted(partial(_unknown, index=i, i=0))
-        for i, part in _members(problem, kind)
+        for i, part in _groups(problem, kind)
     }
 
 
 #: Potentials of electrodes where they are unknown, and shortenings of bolts.
-potentials = partial(of_members, kind=Electrode, name="potential")
-bolt_shortenings = partial(of_members, kind=Bolt, name="bolt_shortening")
+potentials = partial(of_groups, kind=Electrode, name="potential")
+bolt_shortenings = partial(of_groups, kind=Bolt, name="bolt_shortening")
 
 
 def rigid_motions(problem: ContactProblem) -> Functionals:
@@ -404,26 +404,26 @@ def rigid_forces(problem: ContactProblem) -> Functionals:
     }
 
 
-def _members(problem: ContactProblem, kind: type) -> list[tuple[int, str]]:
+def _groups(problem: ContactProblem, kind: type) -> list[tuple[int, str]]:
     """Return numbers and parts of the global unknowns of a kind."""
-    members = problem.body.global_unknowns.members
-    return [(i, m.description.on) for i, m in enumerate(members) if isinstance(m.description, kind)]
+    groups = enumerate(problem.body.global_unknowns.groups)
+    return [(i, group.part) for i, group in groups if isinstance(group.description, kind)]
 
 
 def _rigid_columns(problem: ContactProblem, *keys: str) -> Iterator[tuple[str, int, int]]:
-    """Yield the columns of rigid bodies, and member and component of each."""
-    members, rigid = problem.body.global_unknowns.members, _members(problem, Rigid)
-    foundations = [part for i, part in rigid if members[i].foundation]
-    parts = [part for i, part in rigid if not members[i].foundation]
+    """Yield the columns of rigid bodies, and group and component of each."""
+    groups, rigid = problem.body.global_unknowns.groups, _groups(problem, Motion)
+    foundations = [part for i, part in rigid if groups[i].is_foundation]
+    parts = [part for i, part in rigid if not groups[i].is_foundation]
     for (index, _), end in zip(rigid, name_ends(foundations, parts), strict=True):
-        sizes = problem.dim, members[index].free.size - problem.dim
+        sizes = problem.dim, groups[index].free.size - problem.dim
         columns = [columns_of(NAMES[k], n, end) for k, n in zip(keys, sizes, strict=True) if n]
         yield from ((column, index, i) for i, column in enumerate(chain(*columns)))
 
 
 def _acting(index: int, i: int) -> Reaction:
     """Return a force or moment on a rigid body, or the charge of an electrode."""
-    return Reaction(partial(_on_member, index=index, i=i), partial(_given, index=index, i=i))
+    return Reaction(partial(_on_group, index=index, i=i), partial(_given, index=index, i=i))
 
 
 def _rubbed(problem: ContactProblem, state: State, contact: int | None) -> float:
@@ -454,9 +454,9 @@ def _mean(problem: ContactProblem, part: str, axis: int) -> Array:
 def _unknown(problem: ContactProblem, index: int, i: int, turns: bool = False) -> Array:
     """Return the weights of a global unknown; those of rotations in degrees."""
     body, weights = problem.body, _no_weights(problem)
-    member = body.global_unknowns.members[index]
-    unit = float(member.units[i]) * (np.rad2deg(1.0) if turns else 1.0)
-    body.motion(weights)[member.begin + i] = unit
+    group = body.global_unknowns.groups[index]
+    unit = float(group.units[i]) * (np.rad2deg(1.0) if turns else 1.0)
+    body.motion(weights)[group.begin + i] = unit
     return weights
 
 
@@ -476,22 +476,23 @@ def _on_electrode(problem: ContactProblem, part: str) -> Array:
     return weights
 
 
-def _on_member(problem: ContactProblem, index: int, i: int) -> Array:
+def _on_group(problem: ContactProblem, index: int, i: int) -> Array:
     """Return the weights of a force on a rigid body, or of the charge of an electrode."""
     body, weights = problem.body, _no_weights(problem)
-    member = body.global_unknowns.members[index]
-    if problem.domain.revolved and isinstance(member.description, Rigid) and i != 1:
+    group = body.global_unknowns.groups[index]
+    if problem.domain.revolved and isinstance(group.description, Motion) and i != 1:
         return weights  # over the full turn it cancels
-    at = member.begin + i
-    weights[: body.owned] = body.global_unknowns.ties[:, [at]].toarray()[:, 0] / member.units[i]
-    body.motion(weights)[at] = 1 / member.units[i]
+    at = group.begin + i
+    tied_motion = body.global_unknowns.tied_motion[:, [at]].toarray()[:, 0]
+    weights[: body.owned] = tied_motion / group.units[i]
+    body.motion(weights)[at] = 1 / group.units[i]
     return weights
 
 
 def _given(problem: ContactProblem, state: State, index: int, i: int) -> float:
     """Return the given force on a rigid body, or charge of an electrode, where that is free."""
-    member = problem.body.global_unknowns.members[index]
-    return float(member.forces(state.time)[i] / member.units[i])
+    group = problem.body.global_unknowns.groups[index]
+    return float(group.forces(state.time)[i] / group.units[i])
 
 
 def _no_weights(problem: ContactProblem) -> Array:

@@ -173,7 +173,7 @@ class LocalProblems:
         # Facets inside that are fixed, or an electrode, have a jump, of charges for instance.
         names = [
             *(fixed.on for fixed in body.description.fixed),
-            *(member.description.on for member in body.global_unknowns.members),
+            *(group.part for group in body.global_unknowns.groups),
         ]
         parts = [body.domain.facets_anywhere(name) for name in names]
         boundary = ~inside[..., None]

@@ -269,21 +269,21 @@ def movements(problem: ContactProblem, state: State) -> Movements:
     residual = residual_forces(problem, state)
     forces = body.motion(residual) + global_unknowns.gathered(residual[: body.owned])
     forces += global_unknowns.forces(state.time)
-    for member in global_unknowns.members:
-        values, own = q[member.columns] * member.units, forces[member.columns]
-        part = member.description.on
-        if isinstance(member.description, Electrode):
-            charge = float((own / member.units)[0])
+    for group in global_unknowns.groups:
+        values, own = q[group.columns] * group.units, forces[group.columns]
+        part = group.part
+        if isinstance(group.description, Electrode):
+            charge = float((own / group.units)[0])
             electrodes[part] = {"potential": float(values[0]), "charge": charge}
             continue
-        if isinstance(member.description, Bolt):
+        if isinstance(group.description, Bolt):
             bolts[part] = {"shortening": float(values[0]), "force": float(own[0])}
             continue
         if problem.domain.revolved:
             # Over the full turn forces across the axis, and moments about it, cancel.
             own = np.where(np.arange(own.size) == 1, own, 0.0)
-        own, d = own / member.units, len(member.description.displacement or ())
-        (foundations if member.foundation else parts)[part] = {
+        own, d = own / group.units, len(group.description.displacement or ())
+        (foundations if group.is_foundation else parts)[part] = {
             "displacement": [float(value) for value in values[:d]],
             "rotation": _one_or_more(np.rad2deg(values[d:])),
             "force": [float(value) for value in own[:d]],

@@ -128,14 +128,14 @@ def test_moment_arms_on_a_moving_foundation_are_those_of_the_place(motion) -> No
     body = Body(Linear(1.0, 0.3), [Fixed("top", [constant(0.0, 2)] * 2)])
     problem = ContactProblem(domain, body, Contact("bottom", ball, rigid=moving))
     nodes = displaced(problem, motion).nodes
-    (member,) = problem.body.global_unknowns.members
+    (group,) = problem.body.global_unknowns.groups
     force = np.random.default_rng(nodes.size).standard_normal(nodes.normal.shape)
     into = np.zeros_like(problem.body.zero_displacement())
     nodes.add_jump_transposed(force, into)
     arm = motion(nodes.points) - centre
     moment = COMM.allreduce(float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum()))
     assert abs(moment) > 0.1
-    assert into[-1] / member.units[-1] == pytest.approx(-moment, rel=1e-12)
+    assert into[-1] / group.units[-1] == pytest.approx(-moment, rel=1e-12)
 
 
 @pytest.mark.core

@@ -99,11 +99,11 @@ def test_law_and_coupling_of_a_body_are_those_of_its_materials() -> None:
 
 
 def test_foundations_move_by_the_contact() -> None:
-    """As by `Rigid(foundation=True)`; a problem is made of the contacts of another one."""
+    """A problem is made of the contacts of another one; a body that moves up is pressed alike."""
     body, motion = Body(Linear(10.0, 0.3), Fixed("top", [0.0, 0.0])), Motion([0.0, 0.004])
     plane = Plane((0.0, 0.0), (0.0, 1.0))
     first = Problem(block(), body, Contact("bottom", plane, rigid=motion), Friction(mu=0.1))
-    moved = Body(body.law, body.fixed, rigid=Rigid("bottom", motion, foundation=True))
+    moved = Body(body.law, Fixed("top", [0.0, -0.004]))
     again = Problem(first.domain, first.description, first.contacts)
     second = Problem(first.domain, moved, Contact("bottom", plane), Friction(mu=0.1))
     forces = [solve(problem).contact_force for problem in (first, again, second)]

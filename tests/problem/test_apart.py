@@ -12,7 +12,7 @@ from mpi4py import MPI
 from contact.case.file import parse_case
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed
-from contact.model.rigid import Motion, Rigid
+from contact.model.rigid import Motion
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, residual_as_pressures, residual_forces
 from contact.problem.state import State
@@ -174,8 +174,7 @@ def test_what_moves_freely_joins_bodies(given):
     """A foundation in front of both passes forces on, unless it moves as is given."""
     height = 0.001 if given else None
     motion = Motion([0.0, height], [0.0], [0.0, 0.0 if given else 0.01], [0.0], [0.0, 0.0])
-    pushed = Rigid("bottom", motion, foundation=True)
-    problem = pressed(blocks(MPI.COMM_SELF), 0.0, 0.0, mu=0.0, rigid=[pushed])
+    problem = pressed(blocks(MPI.COMM_SELF), 0.0, 0.0, mu=0.0, rigid=motion)
     shares = problem.body.component_norms
     assert shares.count == (3 if given else 1)
     assert len(set(shares.component)) == (2 if given else 1)

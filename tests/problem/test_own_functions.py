@@ -20,7 +20,6 @@ from contact import (
     Motion,
     Problem,
     Response,
-    Rigid,
     solve,
 )
 from contact.mesh.grid import rectangle
@@ -40,11 +39,10 @@ def solved(
     load: Any = (),
     contact: Any = None,
     mu: Any = None,
-    rigid: Any = (),
     law: Any = LAW,
 ) -> object:
     domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (8, 4))
-    body = Body(law, fixed, load, rigid=rigid)
+    body = Body(law, fixed, load)
     return solve(Problem(domain, body, contact or Contact("bottom"), Friction(mu=mu)))
 
 
@@ -83,7 +81,7 @@ class Updated(Isotropic):
 
 def moved(function: Own) -> object:
     motion = Motion([0.0, function], [0.0], [0.0, 0.0], [0.0], [0.0, 0.0])
-    return solved(rigid=Rigid("bottom", motion, foundation=True))
+    return solved(contact=Contact("bottom", rigid=motion))
 
 
 PLACES: dict[str, tuple[Callable[[Own], object], str]] = {

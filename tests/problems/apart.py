@@ -37,11 +37,11 @@ def blocks(comm: MPI.Intracomm, heights: Sequence[float] = (1.0, 3.0), n: int = 
     return from_mesh(mesh, parts, 2)
 
 
-def pressed(domain: Domain, *tractions: float, mu: float = 0.3, gap: float = 0.0, **of_body):
+def pressed(
+    domain: Domain, *tractions: float, mu: float = 0.3, gap: float = 0.0, rigid=None, **of_body
+):
     """Return the problem of blocks on a foundation, pressed by a traction each."""
-    given = {"materials": Linear(1.0, 0.3), "fixed": [Fixed("held", [0.0, 0.0])], **of_body}
     loads = [Load(f"top{k}", traction=[0.0, -size]) for k, size in enumerate(tractions)]
+    body = Body(Linear(1.0, 0.3), loads=loads, **{"fixed": Fixed("held", [0.0, 0.0]), **of_body})
     friction = Friction(ConstantCoefficient(mu)) if mu > 0 else Friction()
-    return ContactProblem(
-        domain, Body(loads=loads, **given), Contact("bottom", flat(gap)), friction
-    )
+    return ContactProblem(domain, body, Contact("bottom", flat(gap), rigid=rigid), friction)

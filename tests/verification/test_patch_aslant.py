@@ -23,7 +23,6 @@ from contact import (
     PenaltyOptions,
     Plane,
     Problem,
-    Rigid,
     evolve,
     gap_gradient,
     sensitivity,
@@ -89,8 +88,8 @@ def on_plane(dim, cell="", degree=1, moving=None, friction=None):
         foot += symmetric(dim, ("top", dim - 1))[-1:]
         loads = pressed(dim, [*sides[1:], "over"])
     plane = Plane([*np.eye(dim)[-1]], upward(dim))
-    body = Body(LAW, foot, loads, rigid=() if moving is None else (moving,))
-    contact = Contact("under", plane, friction=friction)
+    body = Body(LAW, foot, loads)
+    contact = Contact("under", plane, friction=friction, rigid=moving)
     return Problem(inclined(dim, cell), body, contact, degree=degree)
 
 
@@ -147,8 +146,7 @@ def test_by_all_methods(dim, method):
 def test_on_a_plane_that_moves_under_a_force(dim, condense):
     """That goes up and down alone, and is pressed against the block."""
     turns, force = [0.0] * (1 if dim == 2 else 3), [*[0.0] * (dim - 1), PRESSURE]
-    motion = Motion([*[0.0] * (dim - 1), None], turns, force, turns, [0.0] * dim)
-    moving = Rigid("under", motion, foundation=True)
+    moving = Motion([*[0.0] * (dim - 1), None], turns, force, turns, [0.0] * dim)
     solution = solve(
         on_plane(dim, moving=moving), NewtonOptions(tolerance=1e-13, condense=condense)
     )

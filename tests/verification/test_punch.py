@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Body, Contact, Domain, Fixed, InputError, Motion, Plane, Rigid, solve
+from contact import Body, Contact, Domain, Fixed, InputError, Motion, Plane, solve
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
@@ -57,8 +57,8 @@ def half_space(n: int, far: float, revolved: bool) -> Domain:
 def punched(n: int, far: float, revolved: bool, motion: Motion) -> Newton:
     """Return the method that has solved for a punch."""
     fixed = [Fixed("far", [constant(0.0, 2), constant(0.0, 2)])]
-    body = Body(Linear(1.0, NU), fixed, (), rigid=(Rigid("punch", motion, foundation=True),))
-    contact = Contact("punch", Plane((0.0, 0.0), (0.0, -1.0)))
+    body = Body(Linear(1.0, NU), fixed)
+    contact = Contact("punch", Plane((0.0, 0.0), (0.0, -1.0)), rigid=motion)
     problem = ContactProblem(half_space(n, far, revolved), body, contact, degree=2)
     return newton(problem, tolerance=1e-9)
 
