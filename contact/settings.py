@@ -129,7 +129,9 @@ Tolerance: TypeAlias = Annotated[
     Lt(1),
     Accepted(f"a number from {PRECISION:g}, the precision of numbers, to 1, excluded"),
 ]
+#: Largest count.
+MOST_COUNT = 10_000_000
 Count: TypeAlias = Annotated[
-    int, Ge(1), Le(10_000_000), Accepted("a whole number from 1 to 10000000")
+    int, Ge(1), Le(MOST_COUNT), Accepted(f"a whole number from 1 to {MOST_COUNT}")
 ]
 Switch: TypeAlias = Annotated[bool, Accepted("true or false")]

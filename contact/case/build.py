@@ -186,8 +186,9 @@ def _contacts(
         rigid = None if contact.rigid is None else _acting(case, contact.rigid)
         given: dict[str, Any] = {"friction": friction, "electric": electric, "rigid": rigid}
         if foundation is not None:
-            given |= {"foundation": foundation, "gap": None, "direction": "foundation"}
+            given |= {"foundation": foundation, "direction": "foundation"}
+            given |= dict.fromkeys(("gap", "axis"))
         if layer is not None:
-            given["layer"] = layer
+            given |= {"law": "compliance", "layer": layer}
         made.append(contact.model_copy(update=given))
     return made

@@ -161,6 +161,10 @@ class Case(Section):
         return self._source
 
     @property
+    def _called(self) -> str:
+        return self._source
+
+    @property
     def adapt(self) -> Adapt | None:
         """The adaptive refinement of the mesh, `[mesh.adapt]`; None without."""
         return None if self.mesh is None else self.mesh.adapt

@@ -210,16 +210,12 @@ class Mesh(Section):
         self.require(parametric or self.order == 1, "order", f"order 2 of {others}")
         self.require(parametric or not self.parameters, "parameters", f"those of {others}")
         if self.sides:
+            assert self.generator is not None
             try:
-                self.check_grid()
+                grid.plan(self.generator, *self._grid)
             except grid.GridError as error:
                 raise fault(error.key, error.given, error.accepted) from None
         return self
-
-    def check_grid(self) -> None:
-        """Raise a GridError if a part of a rectangle or box ends between positions of its grid."""
-        assert self.generator is not None
-        grid.plan(self.generator, *self._grid)
 
     @property
     def _grid(self) -> tuple[Any, Any, Any, Any]:

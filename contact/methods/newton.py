@@ -24,7 +24,6 @@ problems with Coulomb friction, SIAM J. Sci. Comput. 30 (2008).
 from __future__ import annotations
 
 import logging
-import sys
 import time
 from dataclasses import dataclass, field, replace
 
@@ -53,6 +52,8 @@ from contact.problem.condensed import (
 )
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.settings import MOST_COUNT
+from contact.tolerances import PRECISION
 
 logger = logging.getLogger("contact.solver")
 
@@ -187,7 +188,8 @@ def _on_contact_nodes(
 ) -> SemismoothNewton:
     """Return the method on a condensed problem, to a tolerance."""
     # Each stage has a limit of its own.
-    options = whole.options.model_copy(update={"tolerance": tolerance, "max_outer": sys.maxsize})
+    changes = {"tolerance": max(tolerance, PRECISION), "max_outer": MOST_COUNT}
+    options = whole.options.model_copy(update=changes)
     underconstrained = not whole.modes.constrained_undeformed
     step = NewtonStep(problem, options, whole.step.parameters, Counters(), underconstrained)
     recorder = Recorder(lambda _: whole.recorder.poll(), logging.DEBUG)

@@ -223,6 +223,11 @@ class Contact(Described):
         return self.overlap == "press"
 
     @property
+    def label(self) -> str:
+        """Name of its results."""
+        return self.name or self.on
+
+    @property
     def conductor(self) -> Conductor | None:
         """The law of the electric contact, where it is given or filled in."""
         return self.electric if isinstance(self.electric, Conductor) else None
@@ -238,12 +243,12 @@ class Contact(Described):
         if isinstance(electric, Electric):
             electric = electric.conductor(domain, self.on)
         filled = {
-            "name": self.name or self.on,
             "foundation": self.obstacle,
-            "layer": self.compliant_layer,
             "friction": self.friction or friction or Friction(),
             "electric": electric,
         }
+        if self.law == "compliance":
+            filled["layer"] = self.compliant_layer
         done = {"gap": None, "direction": "foundation", "axis": None}
         return self.model_copy(update=filled | done)
 

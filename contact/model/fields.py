@@ -16,7 +16,7 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact import _compat
-from contact.arguments import check_finite, naming, real
+from contact.arguments import check_finite, expect, naming, real
 from contact.errors import InputError
 from contact.model.formula import Expression, InTime
 from contact.ranks import on_all_ranks
@@ -94,8 +94,11 @@ def amplitude_of(given: Factor | str | None, known: bool) -> Factor:
     """Return the given amplitude, else `steady` for `known` functions of time, else a `Ramp`."""
     if given is None or isinstance(given, Ramp):
         return steady if known else (given or Ramp())
-    assert callable(given)  # a case has names, which `build_problem` exchanges
-    return given
+    if callable(given):
+        return given
+    # Names of a case are exchanged by `build_problem`.
+    expect("amplitude", given, f'a function of time, or "{CONSTANT}"', given == CONSTANT)
+    return steady
 
 
 def knows_time(fields: Sequence[Field | Moving | None]) -> bool:

@@ -18,7 +18,6 @@ from contact.arguments import OfTime, expect
 from contact.model.fields import Factor, GivenAmplitude, GivenTimed, amplitude_of
 from contact.model.formula import ZERO, Expression, as_number
 from contact.model.section import (
-    IN_PYTHON,
     Described,
     Either,
     FactorOfTime,
@@ -27,6 +26,7 @@ from contact.model.section import (
     Part,
     Timed,
     Vector,
+    in_python,
 )
 from contact.settings import Accepted, Words, fault
 from contact.typing import Array
@@ -55,7 +55,7 @@ def _in_radians(given: Any, info: ValidationInfo) -> Any:
     """Return a rotation in radians: a table has degrees."""
     if isinstance(given, tuple):
         return tuple(_in_radians(value, info) for value in given)
-    if info.context == IN_PYTHON or not isinstance(given, Expression):
+    if in_python(info) or not isinstance(given, Expression):
         return given
     if given.is_constant:
         return Expression(np.pi / 180 * given.value)
@@ -182,14 +182,13 @@ class Motion(Described):
         def every(given: tuple[Any, ...], size: int) -> tuple[Any, ...]:
             return (*given, *[ZERO] * (size - len(given)))
 
-        turns = 2 * dim - 3
         components = {
             "displacement": every(self.displacement or (), dim),
-            "rotation": every(self.turns, turns),
             "force": every(self.force or (), dim),
-            "moment": every(self.moments, turns),
             "centre": self.centre or (0.0,) * dim,
         }
+        if dim == 3:
+            components |= {"rotation": every(self.turns, 3), "moment": every(self.moments, 3)}
         return self.model_copy(update=components)
 
     @property

@@ -85,8 +85,14 @@ CONFIG = ConfigDict(
     use_attribute_docstrings=True,
 )
 
-#: The context of a description that is made in Python, where values may be objects.
-IN_PYTHON = {"python": True}
+#: The contexts of a description that is made in Python, where values may be objects, and of a copy,
+#: whose amplitudes may have names too: it may be of a case.
+IN_PYTHON, IN_COPY = {"python": True}, {"python": True, "copy": True}
+
+
+def in_python(info: ValidationInfo) -> bool:
+    """Tell whether a value is given in Python, not by a table."""
+    return "python" in (info.context or {})
 
 
 class Section(BaseModel):
@@ -108,7 +114,7 @@ class Section(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _read_keys(cls, given: Any, info: ValidationInfo) -> Any:
-        return given if info.context == IN_PYTHON else with_known_keys(cls, given)
+        return given if in_python(info) else with_known_keys(cls, given)
 
     @model_validator(mode="after")
     def _check_conditions(self) -> Self:
@@ -138,6 +144,30 @@ class Section(BaseModel):
         words = Words(f"given {', '.join(given)}") if given else MISSING
         accepted = f"{', '.join(one)}, or instead {', '.join(other)}"
         raise fault(missing[0] if missing else given[-1], words, accepted, identifier)
+
+    @property
+    def _called(self) -> str:
+        """Its name in messages."""
+        return called(type(self).__name__, getattr(self, "on", None))
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy with other values of some keys, checked as those of a new description."""
+        made = super().model_copy(deep=deep)
+        private = made.__pydantic_private__
+        keys = {name: info.alias or name for name, info in type(self).model_fields.items()}
+        given = {keys[name]: getattr(made, name) for name in made.model_fields_set}
+        for name, value in (update or {}).items():
+            given[keys.get(name, name)] = value
+            if name not in {*keys, *keys.values()}:
+                known = keys_of(type(self))
+                error = unknown(name, known, self.hints.get(name, ""))
+                raise error.within(f"{self._called}: ")
+        try:
+            made.__pydantic_validator__.validate_python(given, self_instance=made, context=IN_COPY)
+        except ValidationError as error:
+            raise describe(error, self._called) from None
+        object.__setattr__(made, "__pydantic_private__", private)
+        return made
 
     def __copy__(self) -> Self:
         """Return a copy without cached properties, which those of an update would not be."""
@@ -311,9 +341,9 @@ def _timed(given: Any, info: ValidationInfo) -> Expression | OfTime:
 
 def _factor(given: Any, info: ValidationInfo) -> GivenAmplitude | str:
     """Return an amplitude: of a case file its name, in Python a function of time."""
-    if info.context != IN_PYTHON:
-        if isinstance(given, str) and given:
-            return given
+    if info.context != IN_PYTHON and isinstance(given, str) and given:
+        return given
+    if not in_python(info):
         raise fault("", given, NAMED)
     if given == CONSTANT:
         return steady

@@ -149,7 +149,7 @@ class ContactProblem:
         check_laws("Problem", friction, conductor)
         self.description = body.in_space(domain.dim)
         self.contacts = tuple(one.filled(domain, friction, conductor) for one in contacts)
-        names = [contact.name for contact in self.contacts]
+        names = [contact.label for contact in self.contacts]
         for name in names:
             if names.count(name) > 1:
                 raise InputError(

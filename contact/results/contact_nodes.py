@@ -245,7 +245,7 @@ def contact_shares(
         total = resultant(problem, nodes.points[own], forces[own])
         stick, slides = (nodes.sum(own & (status == name)) for name in ("stick", "slip"))
         area = stick + slides
-        found[contact.name or contact.on] = ContactShare(
+        found[contact.label] = ContactShare(
             problem=problem,
             state=state,
             own=own,

@@ -247,7 +247,7 @@ def named_functionals(problem: ContactProblem) -> dict[str, Functional]:
         elif len(problem.contacts) > 1:
             for number, contact in enumerate(problem.contacts):
                 own = quantity.functionals(problem, number)
-                found |= {f"{column}_{contact.name}": one for column, one in own.items()}
+                found |= {f"{column}_{contact.label}": one for column, one in own.items()}
     return found
 
 

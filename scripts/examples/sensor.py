@@ -28,10 +28,10 @@ def opened(case: Case, electrode: str) -> Case:
     """Return the case with the electrode left open: its potential is not prescribed."""
     kept = []
     for fixed in case.fixed:
-        if fixed.on == electrode:
-            fixed = fixed.model_copy(update={"potential": None})
-        if fixed.potential is not None or fixed.displacement is not None:
+        if fixed.on != electrode:
             kept.append(fixed)
+        elif fixed.displacement is not None:
+            kept.append(fixed.model_copy(update={"potential": None}))
     return case.model_copy(update={"fixed": tuple(kept)})
 
 

@@ -178,7 +178,8 @@ def test_ranks_agree_on_a_layer_in_space():
     def problem(comm):
         bare = leaning_block(comm, 3)
         layer = Layer(0.004, Compliance(0.003), PotentialFactor(4.0))
-        contact = bare.contacts[0].model_copy(update={"foundation": flat(0.005), "layer": layer})
+        update = {"law": "compliance", "foundation": flat(0.005), "layer": layer}
+        contact = bare.contacts[0].model_copy(update=update)
         return ContactProblem(bare.domain, bare.description, contact)
 
     def quantities(loop):

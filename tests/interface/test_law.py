@@ -175,7 +175,7 @@ NO_LAYERS = [
 @pytest.mark.parametrize("layer", NO_LAYERS)
 def test_what_is_no_layer_is_refused(layer):
     bare = leaning_block(MPI.COMM_SELF, 2)
-    contact = bare.contacts[0].model_copy(update={"layer": layer})
+    contact = bare.contacts[0].model_copy(update={"law": "compliance", "layer": layer})
     with pytest.raises(InputError, match=r"\[layer-law\]"):
         ContactProblem(bare.domain, bare.description, contact)
 

@@ -326,9 +326,8 @@ def test_the_best_iterate_is_left_where_the_last_one_is_worse(
     problem = mechanics.bar(
         MPI.COMM_SELF, 4, -0.05, friction=Friction(ConstantCoefficient(0.5)), law=None
     )
-    limits = options(tolerance=1e-14, max_outer=4).model_copy(
-        update={"stopping": stopping, "eps_fp": 1e-30}
-    )
+    limits = options(tolerance=1e-14, max_outer=4)
+    limits = mechanics.unchecked(limits, stopping=stopping, eps_fp=1e-30)
     solver, kind = method(problem, limits), type(problem.start())
     whole = solver._step
 

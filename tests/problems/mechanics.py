@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from mpi4py import MPI
+from pydantic import BaseModel
 
 from contact.case.build import build_problem
 from contact.case.file import Case
@@ -210,8 +211,13 @@ def solve(problem: ContactProblem, tolerance: float = 1e-10, **options) -> Fixed
     return loop
 
 
+def unchecked(options: Options, **changes) -> Options:
+    """Return options with values that no user may give."""
+    return BaseModel.model_copy(options, update=changes)
+
+
 def attempt(problem: ContactProblem, **options) -> tuple[FixedPoint, Outcome]:
-    loop = FixedPoint(problem, FixedPointOptions().model_copy(update=options))  # unchecked
+    loop = FixedPoint(problem, unchecked(FixedPointOptions(), **options))
     return loop, loop.solve()[1]
 
 

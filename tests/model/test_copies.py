@@ -1,0 +1,76 @@
+"""Copies with other values are checked like new descriptions; all else remains."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from contact import (
+    Contact,
+    FixedPointOptions,
+    InputError,
+    Linear,
+    Load,
+    Material,
+    Motion,
+    NewtonOptions,
+    Plane,
+    parse_case,
+)
+from contact.model.section import Section
+from tests.problems.bar import changed
+
+LOAD, CONTACT = Load("top", [0.0, -1.0], amplitude=lambda t: 2 * t), Contact("bottom", "0.1*x")
+PLANE = Plane((0.0, 0.0), (0.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("one", "update", "words"),
+    [
+        (LOAD, {"tracton": [0.0, 1.0]}, r"Load on 'top': tracton: unknown.*mean traction\?"),
+        (LOAD, {"traction": [0.0, "x+"]}, r"Load on 'top': traction\.1: .*\[formula\]"),
+        (LOAD, {"traction": None}, r"\[load-values\]"),
+        (CONTACT, {"gap": "a"}, r"Contact on 'bottom': gap: .*unknown name a"),
+        (CONTACT, {"foundation": PLANE}, r"both gap and foundation; .*\[exclusive-keys\]"),
+        (CONTACT, {"layer": 0.1}, r'layer with law = "compliance"'),
+        (CONTACT, {"resultant": 1.0}, r"resultant: unknown key"),
+        (Material(young=1.0, poisson=0.3), {"poisson": 0.5}, r"Material: poisson: given 0\.5"),
+        (NewtonOptions(), {"tolerence": 1e-6}, r"tolerence: unknown.*mean tolerance\?"),
+        (NewtonOptions(), {"max_outer": 0}, "NewtonOptions: max_outer: given 0"),
+        (FixedPointOptions(), {"eps": 1e-6}, 'eps with stopping = "thesis"'),
+        (parse_case(changed()), {"solver": 3}, "case: solver: .*accepted: a table with method"),
+        (parse_case(changed()), {"title": None, "loads": ()}, "case: loads: .*mean load?"),
+    ],
+)
+def test_other_values_are_checked(one: Section, update: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        one.model_copy(update=update)
+
+
+def test_all_else_remains() -> None:
+    pushed = LOAD.model_copy(update={"traction": [0.0, "-2*x"]})
+    assert pushed == Load("top", [0.0, "-2*x"], amplitude=LOAD.amplitude)
+    assert CONTACT.model_copy(update={"gap": None, "foundation": PLANE}) == Contact("bottom", PLANE)
+    assert CONTACT.model_copy() == CONTACT
+    own = Material(young=1.0, poisson=0.3).model_copy(update={"young": 2.0})
+    assert own.law == Linear(2.0, 0.3)
+    options = NewtonOptions(condense=False).model_copy(update={"tolerance": 1e-6})
+    assert options == NewtonOptions(condense=False, tolerance=1e-6)
+    turned = Motion(rotation=0.3, centre=[0.0, 0.0])
+    assert turned.model_copy(update={"displacement": [1.0, 0.0]}).rotation == turned.rotation
+
+
+def test_a_copy_of_a_case_has_its_name_and_those_of_amplitudes() -> None:
+    growing = {"time": [0.0, 1.0], "value": [0.0, 2.0]}
+    evolution = {"times": [0.0, 1.0], "steps": [2], "amplitudes": {"press": growing}}
+    case = parse_case(changed(evolution=evolution), source="block.toml")
+    load = case.load[0].model_copy(update={"amplitude": "press"})
+    moved = case.model_copy(update={"load": (load,)})
+    assert moved.source == "block.toml" and moved.load[0].amplitude == "press"
+    assert moved.model_copy(update={"load": case.load}) == case
+    unknown = load.model_copy(update={"amplitude": "pres"})
+    with pytest.raises(InputError, match=r"block\.toml: load\.0\.amplitude: .*pres"):
+        case.model_copy(update={"load": (unknown,)})
+    with pytest.raises(InputError, match=r"amplitude: given 'press'"):
+        _ = LOAD.model_copy(update={"amplitude": "press"}).factor
