@@ -140,8 +140,8 @@ def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State
     if coarse.piezoelectric:
         x[coarse.dim :: body.block_size] *= before.phi_scale / body.phi_scale
     x = np.concatenate([x, before.motion(state.x)])
-    forces = np.column_stack([state.forces.contact, state.forces.friction])
-    values = _interpolate(coarse.nodes, forces, fine.nodes.points)
+    stresses = np.column_stack([state.multipliers.contact, state.multipliers.friction])
+    values = _interpolate(coarse.nodes, stresses, fine.nodes.points)
     multipliers = Multipliers.of(fine.nodes, project_half_line(values[:, 0]), values[:, 1:])
     return State(body.prescribe(x, fine.time), multipliers, fine.time, fine.history)
 

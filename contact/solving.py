@@ -372,13 +372,13 @@ def _prescribed(problem: ContactProblem, start: State) -> State:
     """Return an initial guess with the values that the problem prescribes. Collective."""
     _check_state("start", problem, start)
     x = problem.body.prescribe(start.x, problem.time)
-    return State(x, start.forces, problem.time, problem.history)
+    return State(x, start.multipliers, problem.time, problem.history)
 
 
 def _check_state(name: str, problem: ContactProblem, state: State) -> None:
     """Refuse a state of another problem. Collective."""
     unknowns, nodes = problem.start().x.shape, problem.nodes.nodes.size
-    fits = state.x.shape == unknowns and state.forces.contact.shape == (nodes,)
+    fits = state.x.shape == unknowns and state.multipliers.contact.shape == (nodes,)
     if not problem.comm.allreduce(fits, op=MPI.LAND):
         raise InputError(
             f"{name}: given a state of another problem; accepted: one with the same mesh, elements "

@@ -46,7 +46,7 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     body, d = problem.body, problem.dim
     residual = body.nodal(residual_forces(problem, state))[:, :d]
     supports = np.where(problem.body.free[:, :d], 0.0, residual).sum(axis=0)
-    stress = problem.interface.traction(problem.nodal(state), state.forces)
+    stress = problem.interface.traction(problem.nodal(state), state.multipliers)
     given = body.nodal(body.external(state.time))[:, :d].sum(axis=0)
     pushes = np.zeros_like(body.external(state.time))
     forces = -problem.nodes.weight[:, None] * stress

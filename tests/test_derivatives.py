@@ -242,8 +242,8 @@ def test_nodes_that_touch_without_pressure_are_named(monkeypatch):
 def test_a_node_at_its_bound_is_named_and_the_derivative_is_one_sided():
     # all stick at mu = 3; with mu the largest ratio of friction to pressure one node is at its
     # bound, and the solution is the same
-    forces = solve(parse_case(pushed(3.0)), comm=SELF).state.forces
-    ratio = np.linalg.norm(forces.friction, axis=1) / forces.contact
+    multipliers = solve(parse_case(pushed(3.0)), comm=SELF).state.multipliers
+    ratio = np.linalg.norm(multipliers.friction, axis=1) / multipliers.contact
     case, name = parse_case(pushed(float(ratio.max()))), "contact_force_x"
     run = solve(case, comm=SELF)
     found = sensitivity(run, [name], ["friction.mu"])

@@ -209,8 +209,8 @@ def _values(problem: ContactProblem, state: State) -> Arrays:
     body, history = problem.body, state.history or problem.initial
     return {
         "x": body.nodal(state.x)[: body.owned // body.block_size],
-        "pressure": state.forces.contact,
-        "friction": state.forces.friction,
+        "pressure": state.multipliers.contact,
+        "friction": state.multipliers.friction,
         **{HISTORY + name: array for name, array in history.arrays().items()},
     }
 

@@ -322,14 +322,14 @@ def interior_point(
             state = last
         best = min(best, outcome.residuals.significant)
         jump = interface.nodes.jump(state.x)
-        bound = interface.bound(jump, state.forces)
+        bound = interface.bound(jump, state.multipliers)
         # With all nodes open the next bound is zero, and the solution the same.
         if aside is not None and interface.nodes.maximum(bound) <= interface.rounding_pressure(
             jump
         ):
             break
         # Pressures in a nonlinear body may be far from the loads, as beyond its limit load.
-        pressure = interface.pressure(jump, state.forces)
+        pressure = interface.pressure(jump, state.multipliers)
         if problem.body.linear and modes.overloaded(bound, pressure):
             outcome = replace(outcome, residuals=evaluate(problem, state))
             last, outcome = state, replace(outcome, ended=OVERLOADED, overloaded=True)
@@ -402,7 +402,7 @@ class InteriorPoint:
                 break
             interface = self.problem.interface
             jump = interface.nodes.jump(state.x)
-            pressure = interface.nodes.maximum(interface.pressure(jump, state.forces))
+            pressure = interface.nodes.maximum(interface.pressure(jump, state.multipliers))
             if pressure <= interface.rounding_pressure(jump):
                 ended = f"nothing presses after {steps} steps"
                 break
@@ -420,7 +420,7 @@ class InteriorPoint:
         contact, friction = np.zeros(nodes.weight.size), np.zeros(nodes.normal.shape)
         contact[self._rigid] = cones.force / nodes.weight[self._rigid]
         friction[self._frictional] = -cones.friction / nodes.weight[self._frictional, None]
-        return replace(self._state, forces=Multipliers.of(nodes, contact, friction))
+        return replace(self._state, multipliers=Multipliers.of(nodes, contact, friction))
 
     def relative_gap(self) -> float:
         """Return the duality gap over the work of loads and contact. Collective."""

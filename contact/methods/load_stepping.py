@@ -109,7 +109,7 @@ def predicted(problem: ContactProblem, ends: Sequence[tuple[ContactProblem, Stat
     if len(ends) > 1:
         factor = _extrapolation(problem, ends)
         x = x + factor * (x - ends[-2][1].x)
-    start = State(body.prescribe(x, problem.time), last.forces, problem.time, problem.history)
+    start = State(body.prescribe(x, problem.time), last.multipliers, problem.time, problem.history)
     return start if factor > 0 else replace(start, secant_at=x)
 
 

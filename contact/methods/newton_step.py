@@ -133,7 +133,7 @@ class NewtonStep:
         if interface.foundation.active:
             jump = interface.nodes.jump(state.x)
             blocks = blocks + interface.foundation.block(
-                jump, interface.pressure(jump, state.forces)
+                jump, interface.pressure(jump, state.multipliers)
             )
         weighted = interface.weighted(blocks, state.x)
         self.operator.update("secant", state, weighted)
@@ -178,9 +178,11 @@ class NewtonStep:
         """Linearise contact, friction, layer and charge. Collective."""
         parameters, before = self.parameters, state.active_set
         jump = interface.nodes.jump(state.x)
-        total, length = interface.pressure(jump, state.forces), interface.slip_length(jump)
+        total, length = interface.pressure(jump, state.multipliers), interface.slip_length(jump)
         s = interface.friction.bound(total, length)
-        active, about = guarded_active_set(interface, jump, state.forces, s, parameters.c, before)
+        active, about = guarded_active_set(
+            interface, jump, state.multipliers, s, parameters.c, before
+        )
         changed = before is None or not active.same(before)
         unchanged = float(summed(interface.comm, changed)) == 0
         by_slip = np.zeros_like(s)
@@ -218,7 +220,7 @@ class NewtonStep:
 
 def _residual(problem: AnyProblem, iterate: EvaluatedState, laws: LinearisedLaws) -> Array:
     """Return G(x, lambda^0), with the linearised pressure of the layer. Collective."""
-    state, nodes = replace(iterate.state, forces=laws.constant), problem.interface.nodes
+    state, nodes = replace(iterate.state, multipliers=laws.constant), problem.interface.nodes
     at = iterate.state.secant_at
     internal = iterate.internal if at is None else problem.body.secant_forces(iterate.state)
     residual = residual_forces(problem, state, internal)
@@ -232,7 +234,7 @@ def _moved(problem: AnyProblem, state: State, laws: LinearisedLaws, increment: A
     nodes, moved = interface.nodes, interface.nodes.jump(increment)
     change = np.einsum("nij,nj->ni", laws.blocks, moved)
     vectors = laws.constant.vectors(nodes) + change[:, : interface.dim]
-    forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
+    multipliers = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
     pressed = nodes.normal_component(np.einsum("nij,nj->ni", laws.layer, moved))
     layer = interface.foundation.layer_pressure(nodes.jump(state.x)) + laws.layer_shift + pressed
     # Far motions leave nodes of a rigid part off it by rounding.
@@ -240,7 +242,7 @@ def _moved(problem: AnyProblem, state: State, laws: LinearisedLaws, increment: A
     return replace(
         state,
         x=x,
-        forces=forces,
+        multipliers=multipliers,
         active_set=laws.active_set,
         layer_pressure=layer,
         secant_at=None,
@@ -265,7 +267,7 @@ def linearised_layer(
         return law.layer_block(jump, full), np.zeros(jump.shape[0])
     u_n, layer = nodes.normal_component(jump), law.layer_pressure(jump)
     last = layer if state.layer_pressure is None else state.layer_pressure
-    place = graph.displacement(state.forces.contact + last + c * u_n, c)
+    place = graph.displacement(state.multipliers.contact + last + c * u_n, c)
     on_graph = jump.copy()
     on_graph[:, : interface.dim] += (place - u_n)[:, None] * nodes.normal
     block = law.layer_block(on_graph, full)

@@ -77,12 +77,12 @@ class SemismoothNewton:
         interface, c = self.problem.interface, self.step.parameters.c
         jump = interface.nodes.jump(start.x)
         # Rounding of lambda_c at an open node would be a friction bound, and make it stick.
-        closed = constraint_active(start.forces.contact, interface.normal_gap(jump), c)
-        contact = np.where(closed, start.forces.contact, 0.0)
-        forces = Multipliers.of(interface.nodes, contact, start.forces.friction)
-        bound = interface.bound(jump, forces)
-        active_set = interface.active_set(jump, forces, bound, c)
-        return replace(start, forces=forces, active_set=active_set, layer_pressure=None)
+        closed = constraint_active(start.multipliers.contact, interface.normal_gap(jump), c)
+        contact = np.where(closed, start.multipliers.contact, 0.0)
+        multipliers = Multipliers.of(interface.nodes, contact, start.multipliers.friction)
+        bound = interface.bound(jump, multipliers)
+        active_set = interface.active_set(jump, multipliers, bound, c)
+        return replace(start, multipliers=multipliers, active_set=active_set, layer_pressure=None)
 
     def iterate(
         self,
@@ -214,7 +214,7 @@ class ConvergenceMonitor:
     def _largest_pressure(self, state: State) -> float:
         interface = self._problem.interface
         jump = interface.nodes.jump(state.x)
-        return interface.nodes.maximum(interface.pressure(jump, state.forces))
+        return interface.nodes.maximum(interface.pressure(jump, state.multipliers))
 
     def _loss_of_contact(self, state: State) -> End | None:
         """Return zero displacement if contact is lost and no load acts; else None. Collective."""

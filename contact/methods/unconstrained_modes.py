@@ -147,7 +147,7 @@ class UnconstrainedModes:
         interface = problem.interface
         nodes, jump = interface.nodes, interface.nodes.jump(state.x)
         # Pressures that are rounding do not constrain.
-        pressed = interface.pressure(jump, state.forces) > interface.rounding_pressure(jump)
+        pressed = interface.pressure(jump, state.multipliers) > interface.rounding_pressure(jump)
         motions, columns = [], []
         for group in self.groups:
             free = null_space(group.constraints(self.problem.frictional, pressed))
@@ -224,7 +224,7 @@ def with_least_displacements(
         return state, outcome
     if not outcome.converged:
         # A method may stall on contact forces that are rounding.
-        free = replace(state, forces=Multipliers.zero(problem.interface.nodes))
+        free = replace(state, multipliers=Multipliers.zero(problem.interface.nodes))
         residuals = evaluate(problem, free)
         if residuals.excess(outcome.allowed):
             return state, outcome
@@ -234,13 +234,13 @@ def with_least_displacements(
         return state, outcome
     x = body.updated(state.x, -free_motion.motion)
     # Contact forces that are rounding are out of balance after the motion.
-    for forces in (Multipliers.zero(problem.interface.nodes), state.forces):
-        least = replace(state, x=x, forces=forces)
+    for multipliers in (Multipliers.zero(problem.interface.nodes), state.multipliers):
+        least = replace(state, x=x, multipliers=multipliers)
         residuals = evaluate(problem, least)
         if not residuals.excess(outcome.allowed):
             outcome = replace(outcome, residuals=residuals)
-            pressed = problem.interface.nodes.maximum(state.forces.contact) > 0
-            if pressed and forces is not state.forces:
+            pressed = problem.interface.nodes.maximum(state.multipliers.contact) > 0
+            if pressed and multipliers is not state.multipliers:
                 # Pressures that were rounding have constrained other modes.
                 return with_least_displacements(modes, least, outcome)
             return least, outcome

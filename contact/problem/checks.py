@@ -331,7 +331,7 @@ def _flows(
         return _conducts(law, interface.size), _conducts(held, interface.size)
     charged = [
         law.charge_block(jump, pressure, full=True)[:, -1, -1] != 0
-        for law, jump, pressure in interface.acting(state.x, state.forces)
+        for law, jump, pressure in interface.acting(state.x, state.multipliers)
     ]
     return charged[0], charged[1] if held is not None else np.zeros(0, dtype=bool)
 

@@ -69,14 +69,14 @@ class Equations:
 def active_set(problem: ContactProblem, state: State) -> ActiveSet:
     """Return the active set of a solution. Collective."""
     interface, jump = problem.interface, problem.nodal(state)
-    return interface.active_set(jump, state.forces, interface.bound(jump, state.forces))
+    return interface.active_set(jump, state.multipliers, interface.bound(jump, state.multipliers))
 
 
 def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equations:
     """Return the residuals of the equations of an active set. Collective."""
     interface, nodes, jump = problem.interface, problem.nodes, problem.nodal(state)
-    vectors = state.forces.vectors(nodes)
-    slip, pressure = interface.slip(jump), interface.pressure(jump, state.forces)
+    vectors = state.multipliers.vectors(nodes)
+    slip, pressure = interface.slip(jump), interface.pressure(jump, state.multipliers)
     length = np.linalg.norm(slip, axis=1)
     bound = interface.friction.bound(pressure, length)
     along = unit_vectors(slip)
@@ -97,7 +97,7 @@ def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float
     least = WEAK * scales.young * scales.area
     forces = body.norm(body.internal_forces(state)) + body.norm(body.external(state.time))
     moved = problem.interface.c_0 * problem.nodal(state)[:, : problem.dim]
-    stresses = nodes.norm(moved) + nodes.norm(state.forces.vectors(nodes))
+    stresses = nodes.norm(moved) + nodes.norm(state.multipliers.vectors(nodes))
     return forces + least, stresses + least / scales.area**0.5
 
 
@@ -107,15 +107,15 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     In contact without pressure, sticking at the friction bound, slipping by nothing, or at a jump
     of the layer's stiffness: there the solution has one-sided derivatives only.
     """
-    interface, jump, forces = problem.interface, problem.nodal(state), state.forces
+    interface, jump, multipliers = problem.interface, problem.nodal(state), state.multipliers
     active, c = active_set(problem, state), interface.c_0
     moved = c * np.linalg.norm(jump[:, : problem.dim], axis=1)
-    small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(jump, forces), moved))
+    small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(jump, multipliers), moved))
     normal_gap, length = np.abs(interface.normal_gap(jump)), interface.slip_length(jump)
-    weak = np.where(active.closed, np.abs(forces.contact) <= small, c * normal_gap <= small)
+    weak = np.where(active.closed, np.abs(multipliers.contact) <= small, c * normal_gap <= small)
     if interface.friction.acts:
-        bound = interface.bound(jump, forces)
-        margin = np.abs(bound - np.linalg.norm(forces.friction, axis=1))
+        bound = interface.bound(jump, multipliers)
+        margin = np.abs(bound - np.linalg.norm(multipliers.friction, axis=1))
         weak |= active.sticks & active.closed & (margin < small) & (bound > 0)
         weak |= active.slips & (c * length < small)
     weak |= interface.foundation.kinks(jump, max(small / c, EPS * interface.size))
@@ -139,7 +139,7 @@ class Linearised:
         self.problem, self.state = problem, state
         self.active = active_set(problem, state)
         interface, nodes, jump = problem.interface, problem.nodes, problem.nodal(state)
-        self._pressure = interface.pressure(jump, state.forces)
+        self._pressure = interface.pressure(jump, state.multipliers)
         law = interface.foundation.block(jump, self._pressure, full=True)
         self._conditions(jump)
         regular = self._by_force.copy()
@@ -299,9 +299,9 @@ class Linearised:
 def moved_state(problem: ContactProblem, state: State, x: Array, f: Array) -> State:
     """Return a state moved by changes of owned unknowns and contact forces. Collective."""
     nodes = problem.nodes
-    vectors = state.forces.vectors(nodes) + f
-    forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
-    return replace(state, x=problem.body.updated(state.x, x), forces=forces)
+    vectors = state.multipliers.vectors(nodes) + f
+    multipliers = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
+    return replace(state, x=problem.body.updated(state.x, x), multipliers=multipliers)
 
 
 def commit_along(linearised: Linearised, x: Array, change: History) -> History:

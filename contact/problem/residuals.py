@@ -131,14 +131,14 @@ def residual_forces(problem: AnyProblem, state: State, internal: Array | None = 
     """Return G(x, lambda) = F(x) - f + T^T W lambda on the owned unknowns. Collective.
 
     The residual of the body with contact. In (15) of docs/residuals.md lambda includes layer and
-    charge; `state.forces` does not. At fixed unknowns G is the reaction of the support on the body.
-    The internal forces F(x) are those of the material law by default.
+    charge; `state.multipliers` does not. At fixed unknowns G is the reaction of the support on the
+    body. The internal forces F(x) are those of the material law by default.
     """
     body = problem.body
     if internal is None:
         internal = body.internal_forces(state)
     residual = internal - body.external(state.time)
-    problem.interface.add_forces(residual, state.x, state.forces)
+    problem.interface.add_forces(residual, state.x, state.multipliers)
     return residual
 
 
@@ -163,7 +163,7 @@ def force_rounding(
     """
     body, (moved, moved_forces) = problem.body, perturbed or _perturbed(problem, state)
     change = moved_forces - internal
-    problem.interface.add_charge(change, state.x, moved - state.x, state.forces)
+    problem.interface.add_charge(change, state.x, moved - state.x, state.multipliers)
     return MARGIN * EPS / PERTURBATION * body.norms(body.unbalanced(change))
 
 
@@ -195,10 +195,10 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
 
     Multipliers at open nodes, and pressures that are rounding, do not count as contact.
     """
-    jump, multiplier = interface.nodes.jump(state.x), state.forces.contact
+    jump, multiplier = interface.nodes.jump(state.x), state.multipliers.contact
     rounding = interface.rounding_pressure(jump)
     on = constraint_active(multiplier, interface.normal_gap(jump), interface.c_0, rounding)
-    pressed = interface.norms(interface.pressure(jump, state.forces) - multiplier * ~on)
+    pressed = interface.norms(interface.pressure(jump, state.multipliers) - multiplier * ~on)
     in_contact = (pressed > 0) & (pressed > EPS * pressed.max())
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=in_contact).max())
 
@@ -217,7 +217,7 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     perturbed = None if (loads > 0).all() else _perturbed(problem, state)
     internal = body.internal_forces(state)
     on_contact = np.zeros_like(internal)
-    interface.add_forces(on_contact, state.x, state.forces)
+    interface.add_forces(on_contact, state.x, state.multipliers)
     residual = internal - body.external(state.time) + on_contact
     exerted = body.norms(on_contact) + body.piezo_norms(state)
     reactions = body.norms(body.reactions(residual))
@@ -247,9 +247,9 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     reference = np.where(scale > 0, scale, 1.0)
     balance = worst((unbalanced / reference).reshape(1, -1), (rounding / reference).reshape(1, -1))
     jump = interface.nodes.jump(state.x)
-    bound = interface.bound(jump, state.forces)
+    bound = interface.bound(jump, state.multipliers)
     pressures = _as_pressures(interface, contact_rounding)
-    laws = interface_residuals(interface, jump, state.forces, bound, pressures)
+    laws = interface_residuals(interface, jump, state.multipliers, bound, pressures)
     accepted = np.where(loaded, np.minimum(rounding, unbalanced) / reference, 0.0)
     equilibrium_rounding = float(accepted.max())
     residuals, floors = (
@@ -321,9 +321,9 @@ def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]
     external = body.external(state.time)
     residual = residual_forces(problem, state)
     foundation = np.zeros_like(residual)
-    interface.add_forces(foundation, state.x, state.forces)
+    interface.add_forces(foundation, state.x, state.multipliers)
     internal = residual + external - foundation
-    vectors = interface.nodes.weight[:, None] * state.forces.vectors(interface.nodes)
+    vectors = interface.nodes.weight[:, None] * state.multipliers.vectors(interface.nodes)
     interface.nodes.add_jump_transposed(-vectors, foundation)
     return external - foundation + body.reactions(residual), internal
 
@@ -334,7 +334,7 @@ def dissipated(
     """Return the dissipation by friction in a step, at some nodes (n,) or all. Collective."""
     interface = problem.interface
     slip = interface.slip(problem.nodal(state))
-    work = np.einsum("ni,ni->n", state.forces.friction, slip)
+    work = np.einsum("ni,ni->n", state.multipliers.friction, slip)
     return interface.nodes.sum(work if nodes is None else np.where(nodes, work, 0.0))
 
 

@@ -13,13 +13,13 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class State:
-    """Unknowns and contact forces at a time; its arrays are read-only.
+    """Unknowns and multipliers at a time; its arrays are read-only.
 
     Attributes
     ----------
     x
         Local unknowns, ghosts behind the owned ones: displacement and scaled potential by node.
-    forces
+    multipliers
         Multipliers lambda_c and lambda_f at the contact nodes (stress).
     time
         Time of loads and prescribed values; 1 of a static problem.
@@ -35,7 +35,7 @@ class State:
     """
 
     x: Array
-    forces: Multipliers
+    multipliers: Multipliers
     time: float = 1.0
     history: History = field(default_factory=History)
     active_set: ActiveSet | None = None
@@ -44,7 +44,7 @@ class State:
 
     def __post_init__(self) -> None:
         """Mark the arrays as read-only."""
-        for array in (self.x, self.forces.contact, self.forces.friction):
+        for array in (self.x, self.multipliers.contact, self.multipliers.friction):
             array.flags.writeable = False
 
     @property

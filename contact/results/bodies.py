@@ -91,7 +91,7 @@ def _pressed(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) ->
     """Return which of the owned contact nodes are among `nodes` and carry pressure. Collective."""
     contact = problem.nodes
     _, local = owned_among(problem.body.layout.index_map, nodes)
-    pressure = problem.interface.pressure(problem.nodal(state), state.forces)
+    pressure = problem.interface.pressure(problem.nodal(state), state.multipliers)
     # Residuals at open nodes are no pressure, and a thousandth of the rest decides nothing.
     pressed = pressure > PRESSED * contact.maximum(pressure)
     return np.asarray(pressed & np.isin(contact.nodes, local))

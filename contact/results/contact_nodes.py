@@ -150,9 +150,9 @@ def contact_result(
     problem: ContactProblem, state: State, status: NDArray[np.str_]
 ) -> ContactResult:
     """Return the contact nodes of all ranks, with the status of this rank's. Collective."""
-    nodes, jump, forces = problem.nodes, problem.nodal(state), state.forces
+    nodes, jump, multipliers = problem.nodes, problem.nodal(state), state.multipliers
     gap, normal_displacement = nodes.gap, nodes.normal_component(jump)
-    pressure = problem.interface.pressure(jump, forces)
+    pressure = problem.interface.pressure(jump, multipliers)
     own: dict[str, NDArray[Any]] = {
         "points": _clean(problem, nodes.points),
         "weight": nodes.weight,
@@ -162,9 +162,9 @@ def contact_result(
         "normal_displacement": normal_displacement,
         "slip": nodes.tangential_component(jump),
         "pressure": pressure,
-        "friction": forces.friction,
-        "traction": pressure[:, None] * nodes.normal + forces.friction,
-        "friction_bound": problem.interface.bound(jump, forces),
+        "friction": multipliers.friction,
+        "traction": pressure[:, None] * nodes.normal + multipliers.friction,
+        "friction_bound": problem.interface.bound(jump, multipliers),
         "status": status,
         "entry": problem.entry_numbers,
         "node": problem.body.layout.index_map.local_to_global(nodes.nodes),
@@ -237,8 +237,8 @@ def contact_shares(
 ) -> dict[str, ContactShare]:
     """Return the results of each contact by its name, with the status of its nodes. Collective."""
     nodes, jump = problem.nodes, problem.nodal(state)
-    pressure = problem.interface.pressure(jump, state.forces)
-    forces = nodes.weight[:, None] * problem.interface.traction(jump, state.forces)
+    pressure = problem.interface.pressure(jump, state.multipliers)
+    forces = nodes.weight[:, None] * problem.interface.traction(jump, state.multipliers)
     found = {}
     for number, contact in enumerate(problem.contacts):
         own = problem.entry_numbers == number
@@ -330,8 +330,8 @@ def opposite_surface(problem: ContactProblem, state: State) -> Grid | None:
     """
     body, d = problem.body, problem.dim
     owners = Owners.of(body.layout.index_map, problem.comm)
-    pressure = problem.interface.pressure(problem.nodal(state), state.forces)
-    stresses = np.column_stack([pressure, state.forces.vectors(problem.nodes)])
+    pressure = problem.interface.pressure(problem.nodal(state), state.multipliers)
+    stresses = np.column_stack([pressure, state.multipliers.vectors(problem.nodes)])
     ends = np.cumsum([own.nodes.nodes.size for own in problem.geometries])[:-1]
     sides, facets = [], []
     for i, own in enumerate(np.split(stresses, ends)):

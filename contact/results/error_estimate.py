@@ -311,11 +311,11 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     normal_gap = interface.normal_gap(jump)
     values[interface.nodes.nodes] = np.column_stack(
         [
-            state.forces.contact,
+            state.multipliers.contact,
             np.where(np.isfinite(normal_gap), normal_gap, 0.0),  # no rigid part: no pressure on it
-            interface.bound(jump, state.forces),
+            interface.bound(jump, state.multipliers),
             interface.slip(jump),
-            state.forces.friction,
+            state.multipliers.friction,
         ]
     )
     values = with_ghosts(index_map, values)
@@ -337,7 +337,7 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     moved = share * np.sum(areas * (contact**2 + np.sum(friction**2, axis=-1)), axis=1)
     ratio = np.divide(products, moved, out=np.ones_like(moved), where=moved > 0)
     # Beside a facet that touches with all of its nodes there is room, and b is h.
-    touches = values[nodes, 0] > interface.negligible(jump, state.forces.contact)
+    touches = values[nodes, 0] > interface.negligible(jump, state.multipliers.contact)
     within = sums_at(index_map, nodes[touches.all(axis=1)], 1.0) > 0
     alone = ~np.any(touches & within[nodes], axis=1)
     moved *= 1 + alone * np.log(np.maximum(ratio, 1.0))

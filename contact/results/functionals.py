@@ -130,7 +130,7 @@ class ContactForce:
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
-        stress = problem.interface.traction(problem.nodal(state), state.forces)
+        stress = problem.interface.traction(problem.nodal(state), state.multipliers)
         return problem.nodes.sum(np.einsum("nd,nd->n", self._levers(problem), stress))
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
@@ -171,7 +171,7 @@ class MaxPressure(Largest):
 
     def values(self, problem: ContactProblem, state: State) -> Array:
         """Return the pressures."""
-        pressure = problem.interface.pressure(problem.nodal(state), state.forces)
+        pressure = problem.interface.pressure(problem.nodal(state), state.multipliers)
         return np.where(_of_contact(problem, self.contact), pressure, 0.0)
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
@@ -188,7 +188,7 @@ class MeanPressure:
 
     def _pressures(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the pressures of its nodes, and their shares of the area, (n,)."""
-        pressure = problem.interface.pressure(problem.nodal(state), state.forces)
+        pressure = problem.interface.pressure(problem.nodal(state), state.multipliers)
         pressed = _of_contact(problem, self.contact) & (pressure > 0)
         area = problem.nodes.sum(pressed.astype(np.float64))
         return pressure, np.where(pressed, problem.nodes.weight / (area or 1.0), 0.0)
@@ -266,7 +266,7 @@ class Reaction:
         by_x = body.tangent_transposed(state, weights)
         seen = nodes.jump(body.local(weights))
         by_force = nodes.weight[:, None] * seen[:, : nodes.dim]
-        for law, jump, pressure in interface.acting(state.x, state.forces):
+        for law, jump, pressure in interface.acting(state.x, state.multipliers):
             block = law.block(jump, pressure, full=law is interface.foundation)
             there = law.nodes.jump(body.local(weights))
             law.nodes.add_jump_transposed(
@@ -281,13 +281,13 @@ class FoundationCharge:
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
-        acting = problem.interface.acting(state.x, state.forces)
+        acting = problem.interface.acting(state.x, state.multipliers)
         return float(sum(law.nodes.sum(law.charge(jump, p)) for law, jump, p in acting))
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
         by_x = _no_weights(problem)
-        for law, jump, pressure in problem.interface.acting(state.x, state.forces):
+        for law, jump, pressure in problem.interface.acting(state.x, state.multipliers):
             full = law is problem.interface.foundation
             slope = -law.charge_block(jump, pressure, full)[:, -1] / law.phi_scale
             law.nodes.add_jump_transposed(law.nodes.weight[:, None] * slope, by_x)

@@ -151,7 +151,7 @@ class LocalProblems:
         sides, out = Sides(body, self._closures), self._normal_flux()
         facets, nodes, inside = sides.facets, sides.nodes, sides.inside
         forces = np.zeros(body.owned + body.global_unknowns.size)
-        problem.interface.add_forces(forces, state.x, state.forces)
+        problem.interface.add_forces(forces, state.x, state.multipliers)
         touch = np.any(body.nodal(body.local(forces)) != 0, axis=1)[nodes].any(axis=2)
         slave, master = (
             np.isin(facets, np.concatenate([[], *map(body.domain.facets, names)]))
@@ -278,10 +278,10 @@ def _contact_traction(problem: ContactProblem, state: State) -> Array:
     """Return the traction of the multipliers and layers at the nodes, shape (n, d). Collective."""
     # Weiss and Wohlmuth, Math. Comp. 78, 2009. No numbers at nodes without a multiplier.
     body, interface = problem.body, problem.interface
-    pressure = interface.pressure(problem.nodal(state), state.forces)
+    pressure = interface.pressure(problem.nodal(state), state.multipliers)
     found = np.full_like(body.nodal(state.x)[:, : body.dim], np.nan)
     found[interface.nodes.nodes] = (
-        -pressure[:, None] * interface.nodes.normal - state.forces.friction
+        -pressure[:, None] * interface.nodes.normal - state.multipliers.friction
     )
     return with_ghosts(body.space.dofmap.index_map, found)
 

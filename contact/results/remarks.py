@@ -224,7 +224,7 @@ def rounding(solution: Results) -> Iterator[Remark]:
     if uncertainty > KNOWN and (moved or loads[0].max() > 0):
         yield f"contact forces are known to {uncertainty:.1e} of their size only: {larger}"
     on_contact = np.zeros_like(residual)
-    problem.interface.add_forces(on_contact, state.x, state.forces)
+    problem.interface.add_forces(on_contact, state.x, state.multipliers)
     acting = (loads + body.norms(on_contact))[0]
     left = body.norms(body.unbalanced(residual))[0]
     borne = body.norms(body.reactions(residual))[0]
@@ -506,7 +506,7 @@ def rounded_overlaps(problem: ContactProblem, state: State | None = None) -> Ite
         strain = cut / comm.allreduce(float(least), op=MPI.MIN)
         told = strain > (STRAINED if state is None else TOUCHING)
         if told and state is not None:
-            own = np.where(problem.entry_numbers == number, state.forces.contact, 0.0)
+            own = np.where(problem.entry_numbers == number, state.multipliers.contact, 0.0)
             fields = DerivedFields(body, state)
             eps = np.linalg.norm(fields.cell_means()[cells, fields.columns["strain"]], axis=1)
             strained = comm.allreduce(float(eps.max(initial=0.0)), op=MPI.MAX)
@@ -529,7 +529,7 @@ def _straight_edges(solution: Results, closed: NDArray[np.bool_]) -> Iterator[Re
     relative error of about h/R (docs/discretisation.md).
     """
     problem, nodes = solution.problem, solution.problem.nodes
-    turn, pressed = _turn(solution, closed), nodes.maximum(solution.forces.contact)
+    turn, pressed = _turn(solution, closed), nodes.maximum(solution.multipliers.contact)
     unknown = nodes.maximum(np.where(closed, nodes.deviation, 0.0))
     waves = np.pi * problem.scales.plane_modulus * unknown / (8 * problem.scales.spacing)
     if pressed > 0 and waves > DEVIATION * pressed:

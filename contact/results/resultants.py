@@ -54,7 +54,7 @@ def resultant(problem: ContactProblem, points: Array, forces: Array) -> Resultan
 def contact_resultant(problem: ContactProblem, state: State) -> Resultant:
     """Return the resultant of the body's forces on the foundations. Collective."""
     nodes = problem.nodes
-    stress = problem.interface.traction(problem.nodal(state), state.forces)
+    stress = problem.interface.traction(problem.nodal(state), state.multipliers)
     return resultant(problem, nodes.points, nodes.weight[:, None] * stress)
 
 
@@ -222,7 +222,7 @@ def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     """Return the charges that leave the owned nodes through contact; between bodies they cancel."""
     body = problem.body
     leaving = np.zeros_like(body.external(state.time))
-    for law, jump, pressure in problem.interface.acting(state.x, state.forces):
+    for law, jump, pressure in problem.interface.acting(state.x, state.multipliers):
         density = np.zeros((jump.shape[0], body.block_size))
         density[:, -1] = law.nodes.weight * law.charge(jump, pressure)
         law.nodes.add_jump_transposed(density, leaving)

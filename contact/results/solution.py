@@ -109,7 +109,7 @@ class Results:
     problem
         The problem, of a load step that of its time and history.
     state
-        Unknowns, contact forces, time and history: a value, which nothing that is done with the
+        Unknowns, multipliers, time and history: a value, which nothing that is done with the
         problem changes.
     outcome
         Whether it has converged, why it ended, and the residuals.
@@ -203,24 +203,24 @@ class Results:
         return self.problem.nodal(self.state)
 
     @property
-    def forces(self) -> Multipliers:
+    def multipliers(self) -> Multipliers:
         """Multipliers of the unilateral constraint and of friction."""
-        return self.state.forces
+        return self.state.multipliers
 
     @property
     def pressure(self) -> Array:
         """Contact pressure -sigma_nu, shape (n,): multiplier and layer."""
-        return self.problem.interface.pressure(self.nodal, self.forces)
+        return self.problem.interface.pressure(self.nodal, self.multipliers)
 
     @property
     def friction(self) -> Array:
         """Friction stress -sigma_tau = lambda_f, shape (n, d)."""
-        return self.forces.friction
+        return self.multipliers.friction
 
     @property
     def friction_bound(self) -> Array:
         """Friction bound s, shape (n,). Collective."""
-        return self.problem.interface.bound(self.nodal, self.forces)
+        return self.problem.interface.bound(self.nodal, self.multipliers)
 
     @property
     def normal_displacement(self) -> Array:
@@ -248,7 +248,9 @@ class Results:
         """
         interface, jump = self.problem.interface, self.nodal
         rounding = interface.negligible(jump, self.pressure)
-        active = interface.active_set(jump, self.forces, self.friction_bound, rounding=rounding)
+        active = interface.active_set(
+            jump, self.multipliers, self.friction_bound, rounding=rounding
+        )
         layer = interface.foundation.layer_pressure(jump) > rounding
         touches = active.closed | layer
         sticks = active.sticks & (self.friction_bound > 0)

@@ -67,7 +67,7 @@ def uniqueness(
     if condensation is None and not condensation_pays(problem, "auto"):
         return np.inf, False
     jump = nodes.jump(state.x)
-    pressure = interface.pressure(jump, state.forces)
+    pressure = interface.pressure(jump, state.multipliers)
     rounding = interface.negligible(jump, pressure)
     closed = constraint_active(pressure, interface.normal_gap(jump), interface.c_0, rounding)
     if nodes.maximum(closed.astype(float)) == 0:
@@ -90,8 +90,15 @@ def uniqueness(
     motions = np.concatenate(columns, axis=2)
     ranks = nodes.comm.gather(
         (
-            *(nodes.admissible_normal, nodes.tangent, state.forces.friction, closed, mu, motions),
-            nodes.weight[:, None] * state.forces.vectors(nodes),
+            *(
+                nodes.admissible_normal,
+                nodes.tangent,
+                state.multipliers.friction,
+                closed,
+                mu,
+                motions,
+            ),
+            nodes.weight[:, None] * state.multipliers.vectors(nodes),
             interface.normal_gap(jump),
         )
     )

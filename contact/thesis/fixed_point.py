@@ -156,15 +156,15 @@ class OuterLoop(ABC):
 
     def _update_bound(self, iteration: int) -> float:
         """Update the friction bound; return its relative change (3.46), NaN without friction."""
-        interface, forces, old = self.problem.interface, self.state.forces, self.bound
+        interface, multipliers, old = self.problem.interface, self.state.multipliers, self.bound
         if not interface.friction.acts:
             return np.nan
         jump = interface.nodes.jump(self.state.x)
         if iteration == 0:  # frictionless start: bound of zero slip
-            pressure = interface.pressure(jump, forces)
+            pressure = interface.pressure(jump, multipliers)
             self.bound = interface.friction.bound(pressure, np.zeros_like(pressure))
         else:
-            self.bound = interface.bound(jump, forces)
+            self.bound = interface.bound(jump, multipliers)
         size = interface.nodes.norm(self.bound)
         return interface.nodes.norm(self.bound - old) / size if size > 0 else 0.0
 
@@ -244,11 +244,11 @@ class FixedPoint(OuterLoop):
             self.bound = np.zeros(interface.nodes.gap.size) if stuck is None else stuck
         else:
             self.state, first = start, 1
-            jump, pressure = interface.nodes.jump(start.x), start.forces.contact
+            jump, pressure = interface.nodes.jump(start.x), start.multipliers.contact
             if interface.foundation.normal_graph(jump) is not None:
-                pressure = interface.pressure(jump, start.forces)
-            self._z = np.column_stack([pressure, start.forces.friction])
-            self.bound = interface.bound(jump, start.forces)
+                pressure = interface.pressure(jump, start.multipliers)
+            self._z = np.column_stack([pressure, start.multipliers.friction])
+            self.bound = interface.bound(jump, start.multipliers)
         self._first, self._tangent, self._first_bound = first, False, self.bound
         outcome = self._iterate(first)
         return self.state, outcome
@@ -270,7 +270,7 @@ class FixedPoint(OuterLoop):
         state, jump = self.state, interface.nodes.jump(self.state.x)
         blocks = augmentation(interface.nodes, self.r, friction)
         if interface.foundation.active:
-            blocks = blocks + self._charge_block(jump, interface.pressure(jump, state.forces))
+            blocks = blocks + self._charge_block(jump, interface.pressure(jump, state.multipliers))
         # At zero strain the tangent is the secant.
         kind = "tangent" if self._tangent and iteration > self._first else "secant"
         weighted = interface.weighted(blocks, state.x)
@@ -287,7 +287,7 @@ class FixedPoint(OuterLoop):
         )
         self._stalled = result.stalled and not self._gap_derivative.included
         x = body.updated(state.x, result.increment)
-        self.state = replace(state, x=x, forces=result.forces, secant_at=None)
+        self.state = replace(state, x=x, multipliers=result.multipliers, secant_at=None)
         self._z = result.z
         return result.iterations, "tangent" if kind == "tangent" else ""
 

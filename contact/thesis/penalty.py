@@ -94,8 +94,8 @@ class PenalisedLaw:
             penalty_friction_modulus(bound, interface.slip_length(jump), self._eps.slip)
         )
 
-    def forces(self, jump: Array) -> Multipliers:
-        """Return the forces. Collective."""
+    def multipliers(self, jump: Array) -> Multipliers:
+        """Return lambda_c and lambda_f. Collective."""
         modulus = self._modulus_at(jump) if self._modulus is None else self._modulus
         tangential = self._interface.slip(jump)
         return Multipliers(self._pressed(jump)[0].contact, modulus[:, None] * tangential)
@@ -224,7 +224,7 @@ class PenalisedProblem:
         self._law, self._implicit, self._jump = law, implicit, jump
         self._state = state
         self._assembled = False
-        pressure = interface.pressure(jump, state.forces)
+        pressure = interface.pressure(jump, state.multipliers)
         self._response = interface.foundation.force(jump, pressure)
         self._current_block = interface.foundation.charge_block(jump, pressure)
         self._layer = interface.foundation.normal_graph(jump)
@@ -233,7 +233,7 @@ class PenalisedProblem:
             self._response[:, : body.dim] = 0.0
         residual = residual_forces(self._problem, state)
         on_contact = np.zeros_like(residual)
-        interface.add_forces(on_contact, state.x, state.forces)
+        interface.add_forces(on_contact, state.x, state.multipliers)
         norms = body.load_norms(state.time) + body.norms(residual)
         norms = norms + body.norms(on_contact) + body.piezo_norms(state)
         self._units = body.component_norms.spread(np.where(norms > 0, norms, 1.0))
@@ -295,7 +295,7 @@ class PenalisedProblem:
         values = body.secant_forces(self._state_of(x))
         values = values - body.external(self._state.time)
         nodes.add_jump_transposed(
-            nodes.weight[:, None] * self._law.forces(jump).vectors(nodes), values
+            nodes.weight[:, None] * self._law.multipliers(jump).vectors(nodes), values
         )
         change = np.einsum("nij,nj->ni", self._current_block, jump - self._jump)
         if self._layer is not None:
@@ -393,8 +393,8 @@ class Penalty(OuterLoop):
         self._failed = implicit and bool(fault)
         if self._failed:  # go on with frozen terms
             x, fault = self.state.x, f"implicit: {fault}"
-        forces = PenalisedLaw(interface, self._eps).forces(interface.nodes.jump(x))
-        self.state = replace(self.state, x=x, forces=forces)
+        multipliers = PenalisedLaw(interface, self._eps).multipliers(interface.nodes.jump(x))
+        self.state = replace(self.state, x=x, multipliers=multipliers)
         return inner, fault or ("implicit" if implicit else "")
 
     def _solve(self, implicit: bool) -> tuple[Array, int, str]:

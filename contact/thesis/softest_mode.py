@@ -83,7 +83,7 @@ def softest_mode(problem: ContactProblem, operator: Operator, state: State, shif
         # Nodes that face nothing touch no layer.
         layer = graph.layer_slope(np.where(np.isfinite(graph.rho_0), graph.rho_0, 0.0))
         blocks += layer[:, None, None] * augmentation(nodes, 1.0, False)
-    blocks += law.charge_block(jump, interface.pressure(jump, state.forces))
+    blocks += law.charge_block(jump, interface.pressure(jump, state.multipliers))
     weighted = interface.weighted(blocks, state.x)
     operator.update("secant", state, weighted)
 

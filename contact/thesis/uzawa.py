@@ -94,7 +94,7 @@ class RelaxationResult:
 
     increment: Array  #: dx on the owned unknowns
     #: Of lambda + r (u - phi) before Step 3, in equilibrium with u; admissible in the limit alone.
-    forces: Multipliers
+    multipliers: Multipliers
     z: Array  #: variable of the next relaxation, about the new iterate, (n, 1 + d)
     iterations: int  #: number of linear solves
     stalled: bool = False  #: whether the stagnation limit has ended it
@@ -159,21 +159,21 @@ class FrozenProblem:
         """f_n - F(u_n) on the owned unknowns, f_n with lagged layer and charge. Collective."""
         internal = self.problem.body.secant_forces(self.state)
         residual = residual_forces(self.problem, self.state, internal)
-        contact = self.state.forces.vectors(self.nodes)
+        contact = self.state.multipliers.vectors(self.nodes)
         if self.layer is not None:
             pressure = self.interface.foundation.layer_pressure(self.jump_0)
             contact += pressure[:, None] * self.nodes.normal
         self._add(-contact, residual)
         return -residual
 
-    def _add(self, forces: Array, to: Array) -> None:
+    def _add(self, stresses: Array, to: Array) -> None:
         """Add the nodal forces of stresses on Gamma_3, shape (n, d)."""
-        self.nodes.add_jump_transposed(self.nodes.weight[:, None] * forces, to)
+        self.nodes.add_jump_transposed(self.nodes.weight[:, None] * stresses, to)
 
     def displacement_load(self, multipliers: Array, z: Array) -> Array:
         """Return the right-hand side of Step 1, (3.34): f_n - F(u_n) - (2 lambda - z)."""
-        forces, load = 2 * multipliers - z, self._load.copy()
-        self._add(-(forces[:, :1] * self.nodes.normal + forces[:, 1:]), load)
+        stresses, load = 2 * multipliers - z, self._load.copy()
+        self._add(-(stresses[:, :1] * self.nodes.normal + stresses[:, 1:]), load)
         return load
 
     def augmented(self, moved: Array) -> Array:
@@ -300,10 +300,10 @@ def uzawa_block_relaxation(
         stress = 2 * projected - z + r_u
         if iteration == 1:
             stress_unit = interface.component_norms(stress)
-        forces = frozen.multipliers(jump, stress)
+        multipliers = frozen.multipliers(jump, stress)
         if options.single_loop and frozen.friction:
-            bound[:] = interface.bound(jump, forces)
-        residual = float(interface_residuals(interface, jump, forces, bound)[0].max())
+            bound[:] = interface.bound(jump, multipliers)
+        residual = float(interface_residuals(interface, jump, multipliers, bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
         next_z = projected + (1 - over) * (z - projected) + over * r_u
         done = residual <= options.inner or not np.isfinite(residual)
@@ -314,11 +314,11 @@ def uzawa_block_relaxation(
             defect = defect if change is None else change
         stalled = not done and stagnation(defect)
         if done or stalled:
-            return RelaxationResult(increment, forces, next_z - r_u, iteration, stalled)
+            return RelaxationResult(increment, multipliers, next_z - r_u, iteration, stalled)
         z = next_z
         if accelerated:
             if accelerator is None:
                 accelerator = frozen.accelerator(options.depth, stress_unit, bound)
             solved = (stress + r_u).ravel()
             z = accelerator.next(stress.ravel(), solved, next_z.ravel()).reshape(z.shape)
-    return RelaxationResult(increment, forces, z - r_u, options.max_inner)
+    return RelaxationResult(increment, multipliers, z - r_u, options.max_inner)

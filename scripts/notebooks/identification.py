@@ -143,7 +143,7 @@ class Misfit:
     def difference(self, problem, state):
         """Return the difference of the pressures at the nodes."""
         size = problem.nodes.norm(wanted(problem.nodes.points[:, 0]))
-        return (state.forces.contact - wanted(problem.nodes.points[:, 0])) / size, size
+        return (state.multipliers.contact - wanted(problem.nodes.points[:, 0])) / size, size
 
     def __call__(self, problem, state):
         """Return the value."""

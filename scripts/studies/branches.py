@@ -174,8 +174,10 @@ class Branches:
         wave = 1 + DISTURBANCE * np.cos(points @ [70.0, 30.0, 50.0])
         x = found.state.x.copy()
         self._nodal(x)[:] *= wave[:, None]  # global unknowns, behind the nodes, stay
-        factor, forces = wave[problem.nodes.nodes], found.forces
-        disturbed = Multipliers(forces.contact * factor, forces.friction / factor[:, None])
+        factor, multipliers = wave[problem.nodes.nodes], found.multipliers
+        disturbed = Multipliers(
+            multipliers.contact * factor, multipliers.friction / factor[:, None]
+        )
         return State(body.prescribe(x), disturbed)
 
     def _nodal(self, x: Array) -> Array:

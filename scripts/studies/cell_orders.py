@@ -138,7 +138,7 @@ def _squares(known: Any, domain: Domain, degree: int, above: float) -> tuple[flo
     problem = known.on(domain, degree)
     state, nodes = state_of(problem, 1e-10), problem.nodes
     exact = known.pressure(nodes.points)
-    error, dual = state.forces.contact - exact, DualNorm(problem)
+    error, dual = state.multipliers.contact - exact, DualNorm(problem)
     off = nodes.norm(error) / nodes.norm(exact), dual.pressure(error) / dual.pressure(exact)
     return l2_error(problem, state.x, known.displacement, above) ** 2, off[0] ** 2, off[1] ** 2
 

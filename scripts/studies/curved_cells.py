@@ -57,7 +57,7 @@ def solved(problem: ContactProblem) -> tuple[float, Array]:
     """Return the error of the displacements in L2, and the pressures of all ranks."""
     state = state_of(problem, 1e-10)
     size = error(problem.body.space, state.x, LAME)
-    return size, problem.nodes.gather(state.forces.contact)
+    return size, problem.nodes.gather(state.multipliers.contact)
 
 
 def problem_of(kind: str, cell: str, order: int, degree: int, n: int) -> ContactProblem:

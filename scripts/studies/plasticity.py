@@ -296,7 +296,7 @@ def unloading(solution: Solution, turn: int) -> tuple[float, float, float]:
     force = np.array([abs(float(row["contact_force_y"])) for row in rows])
     above, pressed = depth - mark, force > 0
     exponent = np.polyfit(np.log(above[pressed]), np.log(force[pressed]), 1)[0]
-    touching = places[solution.steps[turn].state.forces.contact > 0].max()
+    touching = places[solution.steps[turn].state.multipliers.contact > 0].max()
     width = (touching + places[places > touching].min()) / 2
     rise = above[0] * 4 * EFFECTIVE * width / (3 * force[0])
     return mark / float(depth[0]), float(exponent), float(rise)

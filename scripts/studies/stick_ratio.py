@@ -120,11 +120,11 @@ def stick_ratio(problem: ContactProblem, state: State) -> float:
     """Return c/a: where nodes stick, over where they touch. On one rank."""
     step = problem.at(state.time, state.history)
     interface, nodal = step.interface, step.nodal(state)
-    pressure = interface.pressure(nodal, state.forces)
+    pressure = interface.pressure(nodal, state.multipliers)
     order = np.argsort(step.nodes.points[:, 0])
     x, p = step.nodes.points[order, 0], pressure[order]
-    share = np.linalg.norm(state.forces.friction, axis=1)[order]
-    share = share / np.maximum(interface.bound(nodal, state.forces)[order], 1e-300)
+    share = np.linalg.norm(state.multipliers.friction, axis=1)[order]
+    share = share / np.maximum(interface.bound(nodal, state.multipliers)[order], 1e-300)
     touches = p > 1e-9 * p.max()
     edge = _between(x, ~touches)
     sticks = _between(x[touches], share[touches] >= 1 - 1e-9)

@@ -202,7 +202,7 @@ def test_parts_add_up_to_the_body(
         problem = build_problem(case(**material), COMM)
         body, state = problem.body, problem.start()
         x = np.sin(17.0 * body.layout.points).ravel() * 0.02
-        state = type(state)(body.local(x), state.forces, state.time, state.history)
+        state = type(state)(body.local(x), state.multipliers, state.time, state.history)
         matrix = body.create_matrix()
         products = []
         for kind in ("secant", "tangent", "secant"):

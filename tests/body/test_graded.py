@@ -43,12 +43,12 @@ def pressed(domain, materials, degree=1):
 
 def results(solution):
     """Return contact forces, von Mises stresses, and the estimated error with its norm."""
-    forces = solution.state.forces
+    multipliers = solution.state.multipliers
     fields = DerivedFields(solution.problem.body, solution.state)
     error = estimated(solution.problem, solution.state)
     return [
-        forces.contact,
-        forces.friction,
+        multipliers.contact,
+        multipliers.friction,
         fields.cells()["von_mises"].x.array,
         np.array([error.relative, error.energy]),
     ]
@@ -79,7 +79,9 @@ def test_a_factor_by_cell_is_a_region_by_itself():
     ]
     graded = Material(Linear(1.0, 0.3), on=["left half", "right half"], factor=factor)
     one, other = (pressed(domain, given) for given in (plain, graded))
-    assert one.state.forces.contact == pytest.approx(other.state.forces.contact, abs=1e-12)
+    assert one.state.multipliers.contact == pytest.approx(
+        other.state.multipliers.contact, abs=1e-12
+    )
     assert one.state.x == pytest.approx(other.state.x, abs=1e-12)
 
 

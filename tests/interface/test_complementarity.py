@@ -26,15 +26,17 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     rng = np.random.default_rng(3)
     nodal = 1e-3 * rng.standard_normal((problem.nodes.gap.size, dimension))
     n, nodes = nodal.shape[0], problem.nodes
-    forces = Multipliers(
+    multipliers = Multipliers(
         rng.uniform(0.5, 1.0, n),
         np.einsum("nij,nj->ni", nodes.tangent, 0.3 * rng.standard_normal((n, dimension))),
     )
     parameters = ComplementarityParameters(20.0, 20.0, 20.0)
     none = np.zeros(n, dtype=bool)
     before = ActiveSet(none, none, none)
-    bound = interface.bound(nodal, forces)
-    active, forces = guarded_active_set(interface, nodal, forces, bound, parameters.c, before)
+    bound = interface.bound(nodal, multipliers)
+    active, multipliers = guarded_active_set(
+        interface, nodal, multipliers, bound, parameters.c, before
+    )
     sticks = active.sticks
     assert np.any(sticks & active.closed)
     assert np.any(active.slips & active.closed)
@@ -42,10 +44,10 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     direction, zero = 1e-6 * rng.standard_normal(nodal.shape), np.zeros(n)
 
     def linearised(nodal):
-        pressure, length = interface.pressure(nodal, forces), interface.slip_length(nodal)
+        pressure, length = interface.pressure(nodal, multipliers), interface.slip_length(nodal)
         s = interface.friction.bound(pressure, length)
         bound = LinearisedBound(s, interface.friction.by_pressure(pressure, length), zero)
-        return linearise(interface, nodal, forces, active, parameters, bound)
+        return linearise(interface, nodal, multipliers, active, parameters, bound)
 
     (base, blocks), (moved, _) = linearised(nodal), linearised(nodal + direction)
     difference = moved.vectors(nodes) - base.vectors(nodes)
@@ -64,15 +66,15 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     nodal = np.zeros((nodes.nodes.size, 2))
     nodal[:, 0] = 1e-3
     pressure = np.full(nodes.nodes.size, 0.5)
-    forces = Multipliers(pressure, 0.3 * pressure[:, None] * [1.0, 0.0])
+    multipliers = Multipliers(pressure, 0.3 * pressure[:, None] * [1.0, 0.0])
     parameters = ComplementarityParameters(200.0, 20.0, 1e6)
     every = np.ones(nodes.nodes.size, dtype=bool)
     before = ActiveSet(every, ~every, every)
     interface, limit = problem.interface, softening * parameters.nodal_stiffness
 
     def linearised(nodal):
-        s, length = interface.bound(nodal, forces), interface.slip_length(nodal)
-        active, raised = guarded_active_set(interface, nodal, forces, s, parameters.c, before)
+        s, length = interface.bound(nodal, multipliers), interface.slip_length(nodal)
+        active, raised = guarded_active_set(interface, nodal, multipliers, s, parameters.c, before)
         assert active.same(before)
         by_slip = bound_by_slip(interface, pressure, length, limit)
         bound = LinearisedBound(s, interface.friction.by_pressure(pressure, length), by_slip)

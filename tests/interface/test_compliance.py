@@ -45,7 +45,7 @@ def check_solution(column: LayerColumn, loop: FixedPoint | Newton) -> None:
     assert np.abs(problem.interface.foundation.layer_pressure(nodal) - layer).max() < 1e-10 * max(
         layer, 1
     )
-    assert np.abs(loop.state.forces.contact - rest).max() < 1e-10 * max(layer + rest, 1)
+    assert np.abs(loop.state.multipliers.contact - rest).max() < 1e-10 * max(layer + rest, 1)
     if column.piezo:
         assert np.abs(problem.body.phi_scale * nodal[:, -1] - potential).max() < 1e-10
 
@@ -166,8 +166,8 @@ def test_friction_bound_takes_the_layer_and_the_rigid_part_together(dim, c_nu, r
     assert problem.nodes.size > 0
     assert np.abs(problem.nodes.normal_component(nodal) - depth).max() < 1e-10
     assert np.abs(problem.interface.foundation.layer_pressure(nodal) - share).max() < 1e-10
-    assert np.abs(loop.state.forces.contact - (pressure - share)).max() < 1e-10
-    assert np.abs(loop.state.forces.friction[:, 0] - mu * pressure).max() < 1e-10
+    assert np.abs(loop.state.multipliers.contact - (pressure - share)).max() < 1e-10
+    assert np.abs(loop.state.multipliers.friction[:, 0] - mu * pressure).max() < 1e-10
     assert np.abs(nodal[:, 0] - slip).max() < 1e-10
 
 
@@ -184,8 +184,13 @@ def test_ranks_agree_on_a_layer_in_space():
 
     def quantities(loop):
         nodal, nodes = loop.problem.nodal(loop.state), loop.problem.nodes
-        layer, forces = loop.problem.interface.foundation.layer_pressure(nodal), loop.state.forces
-        sums = [nodes.sum(values) for values in (layer, forces.contact, *forces.friction.T)]
+        layer, multipliers = (
+            loop.problem.interface.foundation.layer_pressure(nodal),
+            loop.state.multipliers,
+        )
+        sums = [
+            nodes.sum(values) for values in (layer, multipliers.contact, *multipliers.friction.T)
+        ]
         assert min(sums[:2]) > 0
         return {"displacement": nodes.maximum(np.linalg.norm(nodal, axis=1)), "sums": sums}
 

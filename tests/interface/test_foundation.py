@@ -108,16 +108,16 @@ def test_penalty_forms(problem, x):
     v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
     u, nodal = body.function(x), nodes.jump(x)
     laws = PenalisedLaw(problem.interface, Regularisation(EPS, EPS), nodal)
-    forces = laws.forces(nodal)
+    multipliers = laws.multipliers(nodal)
     gap = field(problem, nodes.gap)
-    assert 0 < np.count_nonzero(forces.contact) < nodes.size
+    assert 0 < np.count_nonzero(multipliers.contact) < nodes.size
     normal = forms.penalty(u, v, nu, gap, EPS) * ds
-    expected = lumped(problem, forces.contact[:, None] * nodes.normal)
+    expected = lumped(problem, multipliers.contact[:, None] * nodes.normal)
     assert assembled(normal) == pytest.approx(expected, abs=1e-14)
-    pressure = forces.contact
+    pressure = multipliers.contact
     bound = field(problem, problem.interface.friction.bound(pressure, pressure))
     friction = forms.penalty_friction(u, u, v, nu, bound, EPS) * ds
-    assert assembled(friction) == pytest.approx(lumped(problem, forces.friction), abs=1e-14)
+    assert assembled(friction) == pytest.approx(lumped(problem, multipliers.friction), abs=1e-14)
 
 
 @pytest.mark.core

@@ -125,9 +125,9 @@ def test_a_direction_that_is_partly_fixed(prescribed, degree):
     assert u[:, 0] == pytest.approx(prescribed)
     distance = (nodes.points + u - [0.0, -0.5]) @ normal
     assert distance.min() == pytest.approx(0.0, abs=1e-10)
-    assert np.abs(distance[loop.state.forces.contact > 1e-8]).max() < 1e-10
+    assert np.abs(distance[loop.state.multipliers.contact > 1e-8]).max() < 1e-10
     # The load is carried: the wall takes the horizontal part.
-    pressed = nodes.sum(loop.state.forces.contact)
+    pressed = nodes.sum(loop.state.multipliers.contact)
     assert pressed * normal[1] == pytest.approx(0.05, rel=1e-9)
     reaction = supports(problem, loop.state)["bottom"].force
     assert reaction == pytest.approx([-pressed * normal[0], 0.0], rel=1e-9)

@@ -107,17 +107,17 @@ def test_the_solution_with_a_small_radius_is_that_without():
 @pytest.mark.core
 def test_the_bound_is_mu_times_the_pressure_under_the_printed_kernel():
     loop = solve(bar(MPI.COMM_SELF, 8, friction=law(0.9)))
-    problem, forces = loop.problem, loop.state.forces
+    problem, multipliers = loop.problem, loop.state.multipliers
     nodal, x = problem.nodal(loop.state), problem.nodes.points[:, 0]
     square = ((x[:, None] - x) / 0.9) ** 2
     inside = square < 1
     kernel = problem.nodes.weight * inside * np.exp(1 / np.where(inside, square - 1, -1.0))
-    bound = 0.4 * kernel @ forces.contact / kernel.sum(axis=1)
-    assert problem.interface.bound(nodal, forces) == pytest.approx(bound, rel=1e-12)
-    assert np.abs(bound - 0.4 * forces.contact).max() > 1e-4
+    bound = 0.4 * kernel @ multipliers.contact / kernel.sum(axis=1)
+    assert problem.interface.bound(nodal, multipliers) == pytest.approx(bound, rel=1e-12)
+    assert np.abs(bound - 0.4 * multipliers.contact).max() > 1e-4
     slides = problem.interface.slip_length(nodal) > 1e-6
     assert slides.any()
-    friction = np.linalg.norm(forces.friction, axis=1)
+    friction = np.linalg.norm(multipliers.friction, axis=1)
     assert friction[slides] == pytest.approx(bound[slides], rel=1e-6)
 
 

@@ -27,16 +27,16 @@ COMM = MPI.COMM_WORLD
 RING = Path(meshes.__file__).parent / "fixtures" / "ring.msh"
 
 
-def along_normal(problem, forces) -> float:
+def along_normal(problem, multipliers) -> float:
     """Return the largest normal component of friction over the largest pressure. Collective."""
-    largest = problem.nodes.maximum(np.abs(problem.nodes.normal_component(forces.friction)))
-    return largest / problem.nodes.maximum(forces.contact)
+    largest = problem.nodes.maximum(np.abs(problem.nodes.normal_component(multipliers.friction)))
+    return largest / problem.nodes.maximum(multipliers.contact)
 
 
 def forces_of(solution) -> np.ndarray:
     """Return what each contact exerts, shape (contacts, d). Collective."""
     problem, nodes = solution.problem, solution.problem.nodes
-    vectors = solution.forces.contact[:, None] * nodes.normal + solution.forces.friction
+    vectors = solution.multipliers.contact[:, None] * nodes.normal + solution.multipliers.friction
     sizes = [own.nodes.nodes.size for own in problem.geometries]
     groups = np.split(nodes.weight[:, None] * vectors, np.cumsum(sizes)[:-1])
     return problem.comm.allreduce(np.array([group.sum(axis=0) for group in groups]), op=MPI.SUM)
@@ -45,7 +45,7 @@ def forces_of(solution) -> np.ndarray:
 def check(solution) -> None:
     """Only the two contacts press on the ring: their forces are opposite. Collective."""
     assert solution.converged, solution.outcome.reason
-    assert along_normal(solution.problem, solution.forces) < 1e-14
+    assert along_normal(solution.problem, solution.multipliers) < 1e-14
     plate, lid = forces_of(solution)
     assert abs(plate[1]) > 1e-6
     assert plate[1] == pytest.approx(-lid[1], rel=1e-7)
@@ -73,12 +73,12 @@ def test_pressures_balance_the_reaction(method):
     case = squeezed(method, moduli, "ring_top", -0.004130309947621388, file=str(RING))
     solution = solve(case, comm=MPI.COMM_SELF)
     nodes = solution.problem.nodes
-    assert along_normal(solution.problem, solution.forces) < 1e-14
+    assert along_normal(solution.problem, solution.multipliers) < 1e-14
     assert solution.converged or method == "uzawa"
     if solution.converged:
         check(solution)
         for side in (nodes.normal[:, 1] > 0, nodes.normal[:, 1] < 0):
-            pressed = nodes.sum(solution.forces.contact * side)
+            pressed = nodes.sum(solution.multipliers.contact * side)
             assert pressed == pytest.approx(2.3788e-5, rel=2e-4)
 
 
@@ -91,11 +91,11 @@ def test_residual_sees_friction_along_the_normal(share):
     assert evaluate(problem, state).largest < 1e-10
     closed = solution.status != "open"
     for there in (closed, ~closed):
-        size = share * state.forces.contact.max() * there
-        friction = state.forces.friction + size[:, None] * nodes.normal
-        pressure = state.forces.contact - size * closed
-        for taken in (state.forces.contact, pressure):
-            wrong = replace(state, forces=Multipliers(taken, friction))
+        size = share * state.multipliers.contact.max() * there
+        friction = state.multipliers.friction + size[:, None] * nodes.normal
+        pressure = state.multipliers.contact - size * closed
+        for taken in (state.multipliers.contact, pressure):
+            wrong = replace(state, multipliers=Multipliers(taken, friction))
             assert evaluate(problem, wrong).friction > 1e-5
 
 

@@ -186,9 +186,9 @@ def test_what_a_method_leaves_at_partly_covered_nodes_is_no_pressure(share, warn
     )
     covered = solution.problem.geometries[0].covered
     assert (covered < 0.5).any()
-    pressure = np.where(covered < 0.5, share, 1.0) * solution.state.forces.contact.max()
-    forces = Multipliers(pressure, solution.state.forces.friction)
-    changed = replace(solution, state=replace(solution.state, forces=forces))
+    pressure = np.where(covered < 0.5, share, 1.0) * solution.state.multipliers.contact.max()
+    multipliers = Multipliers(pressure, solution.state.multipliers.friction)
+    changed = replace(solution, state=replace(solution.state, multipliers=multipliers))
     words = [text for text in sides(changed) if "less than half" in text]
     assert bool(words) == warned
 

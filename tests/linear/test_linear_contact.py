@@ -161,7 +161,7 @@ def test_contact_alone_may_hold_the_body(dim: int) -> None:
     method = Newton(problem, NewtonOptions(linear="iterative"))
     state, outcome = method.solve()
     assert outcome.converged
-    assert np.allclose(state.forces.contact, 0.02, rtol=1e-6)
+    assert np.allclose(state.multipliers.contact, 0.02, rtol=1e-6)
 
 
 @pytest.mark.core

@@ -75,5 +75,5 @@ def test_a_ball_that_only_another_ball_holds(mu, push, monkeypatch):
         found[linear] = solve(problem, case.solver)
         assert found[linear].converged
     assert max(left) <= 1
-    direct = found["lu"].state.forces.contact
-    assert np.abs(found["iterative"].state.forces.contact - direct).max() < 1e-5 * direct.max()
+    direct = found["lu"].state.multipliers.contact
+    assert np.abs(found["iterative"].state.multipliers.contact - direct).max() < 1e-5 * direct.max()

@@ -163,7 +163,7 @@ def solve(domain: Domain) -> tuple[np.ndarray, np.ndarray]:
     problem = ContactProblem(domain, body, Contact("Two.low", gap, against="One.high"))
     state, outcome = Newton(problem, NewtonOptions(tolerance=1e-13)).solve()
     assert outcome.converged, outcome
-    return state.x, state.forces.contact
+    return state.x, state.multipliers.contact
 
 
 def test_contact_of_two_instances(tmp_path):

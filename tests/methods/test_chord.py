@@ -39,7 +39,7 @@ def test_it_changes_nothing(yield_strain):
     always, chord = (newton(problem, reuse=k) for k in ("never", "within"))
     one, other = always.state, chord.state
     assert np.allclose(one.x, other.x, rtol=0, atol=1e-8 * np.abs(one.x).max())
-    assert np.allclose(one.forces.contact, other.forces.contact, rtol=0, atol=1e-8)
+    assert np.allclose(one.multipliers.contact, other.multipliers.contact, rtol=0, atol=1e-8)
 
 
 def followed() -> tuple[Newton, list[Counters]]:

@@ -32,7 +32,7 @@ def test_the_least_of_all_places():
     solution = solve(squeezed("newton", way=0.01), domain=between_plates(COMM, 0))
     problem, state, nodes = solution.problem, solution.state, solution.problem.nodes
     assert solution.converged
-    assert nodes.maximum(solution.forces.contact) < 1e-14  # rounding of E
+    assert nodes.maximum(solution.multipliers.contact) < 1e-14  # rounding of E
     assert solution.outcome.reason.startswith("all residuals <= 1e-08")
     (said,) = [text for text in solution.warnings if "nothing holds" in text]
     motions = "translation along x, translation along y, rotation"
@@ -76,7 +76,7 @@ def test_a_ring_that_a_lid_pushes_aside():
     case = parse_case(tables)
     solution = solve(case, domain=between_plates(COMM, 1))
     assert solution.converged, solution.outcome.reason
-    assert solution.problem.nodes.maximum(solution.forces.contact) == 0
+    assert solution.problem.nodes.maximum(solution.multipliers.contact) == 0
     assert solution.outcome.residuals.equilibrium < 1e-12
     # Strains are rounding: the estimate was 59 % of them, and a warning.
     assert solution.error is not None and solution.error.relative == 0
@@ -90,7 +90,7 @@ def test_a_loaded_ring_that_lies_on_a_plate(seed):
     solution = solve(case, domain=between_plates(COMM, seed))
     assert solution.converged
     nodes = solution.problem.nodes
-    pressed = nodes.sum(solution.forces.contact * nodes.normal[:, 1])
+    pressed = nodes.sum(solution.multipliers.contact * nodes.normal[:, 1])
     assert abs(pressed) == pytest.approx(1e-3 * np.pi, rel=0.02)  # a polygon in a circle
 
 
@@ -321,5 +321,5 @@ def test_a_body_that_lies_lightly_on_one_that_is_bent():
     """What bends the lower one is far more than friction has to bear: it stalled at 4e-1."""
     loop, state = relaxed(on_a_bent_one())
     problem = loop.problem
-    pressed = problem.interface.nodes.sum(state.forces.contact * problem.nodes.normal[:, 1])
+    pressed = problem.interface.nodes.sum(state.multipliers.contact * problem.nodes.normal[:, 1])
     assert abs(pressed) == pytest.approx(2e-6, rel=1e-6)  # 2 wide

@@ -153,10 +153,10 @@ def test_an_interior_point_with_friction_on_a_layer(kind, rigid):
     assert outcome.converged, outcome.reason
     interface, nodal = problem.interface, problem.nodal(state)
     layer = interface.foundation.layer_pressure(nodal)
-    bound = interface.bound(nodal, state.forces)
+    bound = interface.bound(nodal, state.multipliers)
     slips = interface.slip_length(nodal) > 1e-6
     assert (slips & (layer > 0)).any()
-    assert (problem.nodes.maximum(state.forces.contact) > 0) == rigid
+    assert (problem.nodes.maximum(state.multipliers.contact) > 0) == rigid
     newton = Newton(problem, NewtonOptions(condense=False)).semismooth
     begin = newton.step.without_contact(problem, problem.start())
     method = InteriorPoint(newton, bound, begin)
@@ -164,7 +164,9 @@ def test_an_interior_point_with_friction_on_a_layer(kind, rigid):
     assert ended.startswith("duality gap closed"), ended
     found = method.state  # in equilibrium to 1e-4
     assert np.abs(found.x - state.x).max() < 1e-4 * np.abs(state.x).max()
-    assert np.abs(found.forces.friction - state.forces.friction).max() < 1e-4 * bound.max()
+    assert (
+        np.abs(found.multipliers.friction - state.multipliers.friction).max() < 1e-4 * bound.max()
+    )
     # The friction bounds of the method itself, from zero on.
     found, outcome = interior_point(newton, begin)
     assert outcome.converged, outcome.reason
@@ -237,7 +239,7 @@ def test_no_friction_is_solved_like_none(law):
     assert outcome.converged, outcome.reason
     # The upper half rolls on the lower one at next to no force: two runs whose residuals are 2e-12
     # differ by 5e-6, and pressures, which are up to 27, by 1e-6 with it; by elastic strains less.
-    assert np.allclose(state.forces.contact, found.forces.contact, rtol=0, atol=1e-5)
+    assert np.allclose(state.multipliers.contact, found.multipliers.contact, rtol=0, atol=1e-5)
     body = method.problem.body
     points, component = body.layout.points, body.components[0]
     upper = component == component[points[:, 1].argmax()]

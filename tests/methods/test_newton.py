@@ -52,14 +52,14 @@ def compare(one: ContactProblem, other: ContactProblem, tolerance: float) -> Non
     slow, outcome = FixedPoint(other, FixedPointOptions(tolerance=1e-10)).solve()
     assert outcome.converged
     size = np.abs(slow.x).max()
-    atol = tolerance * slow.forces.contact.max()
+    atol = tolerance * slow.multipliers.contact.max()
     for condense in (True, False):
         fast = newton(one, condense=condense)
         assert (fast.counters.contact_solves > 0) == condense
         found = fast.state
         assert np.allclose(found.x, slow.x, rtol=0, atol=tolerance * size)
-        assert np.allclose(found.forces.contact, slow.forces.contact, rtol=0, atol=atol)
-        assert np.allclose(found.forces.friction, slow.forces.friction, rtol=0, atol=atol)
+        assert np.allclose(found.multipliers.contact, slow.multipliers.contact, rtol=0, atol=atol)
+        assert np.allclose(found.multipliers.friction, slow.multipliers.friction, rtol=0, atol=atol)
 
 
 @pytest.mark.core
@@ -98,15 +98,15 @@ def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
     problem = mechanics.bar(SELF, 16, -0.05, friction=friction)
     slow, outcome = FixedPoint(problem, FixedPointOptions(tolerance=1e-10)).solve()
     assert outcome.converged
-    x, forces = slow.x, slow.forces
+    x, multipliers = slow.x, slow.multipliers
     slip = problem.nodes.tangential_component(problem.nodal(slow))
-    rounding = 1e-11 * forces.contact.max()
-    is_open = forces.contact < 1e3 * rounding
+    rounding = 1e-11 * multipliers.contact.max()
+    is_open = multipliers.contact < 1e3 * rounding
     assert is_open.any()
-    pressure = np.where(is_open, rounding, forces.contact)
+    pressure = np.where(is_open, rounding, multipliers.contact)
     against = np.where(is_open[:, None], -rounding * np.sign(slip), 0.0)
     fast = Newton(problem, NewtonOptions(tolerance=1e-9))
-    state, outcome = fast.solve(State(x, Multipliers(pressure, forces.friction + against)))
+    state, outcome = fast.solve(State(x, Multipliers(pressure, multipliers.friction + against)))
     assert outcome.converged
     assert len(fast.history) == 1  # no step
     assert np.allclose(state.x, x, rtol=0, atol=1e-8 * np.abs(x).max())
@@ -126,7 +126,7 @@ def test_the_last_steps_square_the_residual():
 def test_a_body_that_only_contact_holds_is_solved():
     problem = mechanics.pressed_block(SELF, 3, gap=0.01)
     method = newton(problem)
-    assert np.allclose(method.state.forces.contact, 0.02, rtol=1e-9)
+    assert np.allclose(method.state.multipliers.contact, 0.02, rtol=1e-9)
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ def test_nested_meshes_change_nothing():
     plain = solve(bar_case(32), comm=SELF)
     nested = solve(bar_case(32, "solver.nested=true"), comm=SELF)
     assert plain.outcome.converged and nested.outcome.converged
-    assert np.allclose(plain.forces.contact, nested.forces.contact, rtol=0, atol=1e-8)
+    assert np.allclose(plain.multipliers.contact, nested.multipliers.contact, rtol=0, atol=1e-8)
 
 
 def test_nested_levels_halve_the_cells():
@@ -219,8 +219,11 @@ def test_more_than_friction_can_hold_is_refused():
 @pytest.mark.parallel(alone=False)
 def test_ranks_agree():
     def quantities(method):
-        forces, nodes = method.state.forces, method.problem.nodes
-        return {"p": nodes.maximum(forces.contact), "friction": nodes.norm(forces.friction)}
+        multipliers, nodes = method.state.multipliers, method.problem.nodes
+        return {
+            "p": nodes.maximum(multipliers.contact),
+            "friction": nodes.norm(multipliers.friction),
+        }
 
     agree(lambda comm: newton(mechanics.leaning_block(comm)), quantities, 1e-9)
 
@@ -335,7 +338,7 @@ def test_the_best_iterate_is_left_where_the_last_one_is_worse(
         made = whole(*arguments)
         if len(solver.history) < 3:
             return made
-        solver.state = kind(factor * solver.state.x, solver.state.forces)
+        solver.state = kind(factor * solver.state.x, solver.state.multipliers)
         return made
 
     monkeypatch.setattr(solver, "_step", spoilt)

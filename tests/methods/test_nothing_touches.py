@@ -112,7 +112,7 @@ LIFTED = {
 def test_an_evolution_that_lifts_off():
     """It took 300 solves a step."""
     steps = stepped(build_problem(parse_case(LIFTED), SELF), SIXTHS)
-    presses = [bool(state.forces.contact.max() > 0) for state, _ in steps]
+    presses = [bool(state.multipliers.contact.max() > 0) for state, _ in steps]
     assert presses == 3 * [True] + 3 * [False]
 
 
@@ -136,8 +136,8 @@ def test_two_blocks_unloaded_to_zero_end_at_zero(loads, condense):
     """The last step took up to 1655 dense solves: forces fell to 1e-164, by their rounding."""
     problem = build_problem(parse_case(unloaded(loads)), SELF)
     *pressed, (end, _) = stepped(problem, TENTHS, condense=condense)
-    assert all(state.forces.contact.max() > 0 for state, _ in pressed)
-    assert not end.x.any() and not end.forces.contact.any()
+    assert all(state.multipliers.contact.max() > 0 for state, _ in pressed)
+    assert not end.x.any() and not end.multipliers.contact.any()
 
 
 def leaves_let_go() -> list[tuple[State, Outcome]]:
@@ -164,8 +164,8 @@ def leaves_let_go() -> list[tuple[State, Outcome]]:
 def test_leaves_whose_loads_vanish_go_back_to_zero():
     """Their pressures ended at 1e-12 of those before, as rounding, and cycled: 300 dense solves."""
     (pressed, _), (gone, _) = leaves_let_go()
-    assert pressed.forces.contact.max() > 0
-    assert gone.forces.contact.max() == 0
+    assert pressed.multipliers.contact.max() > 0
+    assert gone.multipliers.contact.max() == 0
     assert np.abs(gone.x).max() == 0
 
 
@@ -252,8 +252,8 @@ def test_what_is_unloaded_to_next_to_nothing_is_as_accurate(left):
     one, two = newton[0], uzawa[0]
     size = 0.02 * left + 1e-100
     assert np.abs(one.x - two.x).max() < 1e-6 * size
-    assert np.abs(one.forces.friction - two.forces.friction).max() < 1e-6 * size
-    assert 0.5 * left <= np.abs(one.forces.contact).max() / 0.01 < 100 * size
+    assert np.abs(one.multipliers.friction - two.multipliers.friction).max() < 1e-6 * size
+    assert 0.5 * left <= np.abs(one.multipliers.contact).max() / 0.01 < 100 * size
 
 
 def test_a_penalised_body_that_is_unloaded_to_nothing_rests():

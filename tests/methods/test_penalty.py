@@ -53,8 +53,8 @@ def test_error_and_pressure_fall_like_eps(load):
         assert outcome.converged, outcome.reason
         assert outcome.residuals.equilibrium <= 1e-8
         errors.append(relative(problem, state.x[:owned], x))
-        pressure = reference.forces.contact
-        difference = problem.nodes.norm(state.forces.contact - pressure)
+        pressure = reference.multipliers.contact
+        difference = problem.nodes.norm(state.multipliers.contact - pressure)
         pressures.append(difference / problem.nodes.norm(pressure))
     assert np.log10(errors[1] / errors[2]) == pytest.approx(1.0, abs=0.1)
     assert np.log10(pressures[1] / pressures[2]) == pytest.approx(1.0, abs=0.1)
@@ -70,8 +70,8 @@ def test_without_friction_the_penetration_is_eps_times_the_pressure():
     assert outcome.converged
     assert len(penalty.history) == 1
     normal_gap = problem.interface.normal_gap(problem.nodal(state))
-    touching = state.forces.contact > 0
-    assert np.allclose(normal_gap[touching], -1e-5 * state.forces.contact[touching])
+    touching = state.multipliers.contact > 0
+    assert np.allclose(normal_gap[touching], -1e-5 * state.multipliers.contact[touching])
     # The Signorini residual is the penetration: c eps with c = E/size = 1/4.
     assert outcome.residuals.contact == pytest.approx(0.25e-5, rel=1e-6)
 
@@ -178,7 +178,7 @@ def test_blocks_are_the_derivative_of_the_forces(law, dim):
     model = PenalisedLaw(interface, eps, None if law == "implicit" else x + d)
 
     def forces(t: float):
-        return model.forces(x + t * d).vectors(problem.nodes)
+        return model.multipliers(x + t * d).vectors(problem.nodes)
 
     step = 1e-6
     numerical = (forces(step) - forces(-step)) / (2 * step)
@@ -231,7 +231,7 @@ def test_friction_by_the_potential_is_that_of_the_pressure_of_the_layer():
     problem = build_problem(parse_case(case), MPI.COMM_SELF)
     x, d = 0.1 * np.random.default_rng(1).normal(size=(2, problem.nodes.size, 3))
     model, step = PenalisedLaw(problem.interface, Regularisation(0.3, 0.2)), 1e-6
-    before, after = (model.forces(x + t * d).vectors(problem.nodes) for t in (-step, step))
+    before, after = (model.multipliers(x + t * d).vectors(problem.nodes) for t in (-step, step))
     exact = np.einsum("nij,nj->ni", model.block(x), d)
     assert np.allclose((after - before) / (2 * step), exact, rtol=1e-6, atol=1e-9)
 
@@ -248,7 +248,7 @@ def test_a_body_that_only_the_foundation_holds(gap):
     penalty = Penalty(problem, PenaltyOptions(eps_contact=1e-6))
     state, outcome = penalty.solve()
     assert outcome.converged, outcome.reason
-    assert np.allclose(state.forces.contact, 0.1)
+    assert np.allclose(state.multipliers.contact, 0.1)
 
 
 def test_a_body_that_nothing_holds_does_not_converge():

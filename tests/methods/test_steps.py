@@ -62,8 +62,8 @@ def test_stepped_block(name, dim, degree, method):
     for found, exact, way in zip(steps, stepped.steps, stepped.ways, strict=True):
         nodal = problem.nodal(found)
         assert np.abs(nodal[:, 0] - exact.slip).max() < 1e-10
-        assert np.abs(found.forces.friction[:, 0] - exact.stress).max() < 1e-10
-        assert np.abs(found.forces.contact - exact.pressure).max() < 1e-10
+        assert np.abs(found.multipliers.friction[:, 0] - exact.stress).max() < 1e-10
+        assert np.abs(found.multipliers.contact - exact.pressure).max() < 1e-10
         history = problem.commit(found)[SLIP]
         assert np.abs(history.accumulated - way).max() < 1e-10
 
@@ -75,7 +75,7 @@ def test_one_step_from_rest_is_the_static_problem():
     static = solve(problem, NewtonOptions()).state
     (state,) = evolve(problem, [1.0])
     assert np.array_equal(state.x, static.x)
-    assert np.array_equal(state.forces.friction, static.forces.friction)
+    assert np.array_equal(state.multipliers.friction, static.multipliers.friction)
 
 
 def balances(problem, steps):
@@ -110,13 +110,13 @@ def test_methods_agree_at_every_step(law):
     kinds = set()
     for one, two in zip(newton, uzawa, strict=True):
         assert np.abs(one.x - two.x).max() < 1e-7 * np.abs(one.x).max()
-        size = np.abs(one.forces.contact).max()
-        difference = one.forces.friction - two.forces.friction
+        size = np.abs(one.multipliers.contact).max()
+        difference = one.multipliers.friction - two.multipliers.friction
         assert np.abs(difference).max() < 1e-7 * size
         problem = shaken(law).at(one.time, one.history)
         interface, nodal = problem.interface, problem.nodal(one)
-        bound = interface.bound(nodal, one.forces)
-        active = interface.active_set(nodal, one.forces, bound, rounding=1e-9)
+        bound = interface.bound(nodal, one.multipliers)
+        active = interface.active_set(nodal, one.multipliers, bound, rounding=1e-9)
         kinds |= set(zip(active.closed, active.sticks, active.slips, strict=True))
     assert len(kinds) == 3  # open, sticking and sliding nodes have been met
 

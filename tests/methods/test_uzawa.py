@@ -34,7 +34,7 @@ from tests.problems.mechanics import (
 def test_reference_values_of_another_code(n, f2, rho, pressure, largest):
     problem = bar(MPI.COMM_SELF, n, f2, rho)
     loop = solve(problem, 1e-8)
-    assert loop.state.forces.contact.max() == pytest.approx(pressure, abs=5.1e-6)
+    assert loop.state.multipliers.contact.max() == pytest.approx(pressure, abs=5.1e-6)
     assert np.abs(loop.state.x).max() == pytest.approx(largest, abs=5.1e-6)
 
 
@@ -116,7 +116,7 @@ def test_tresca_friction_is_one_step():
 def test_a_wide_gap(gap):
     """The body is held by nothing until it touches."""
     loop = solve(pressed_block(MPI.COMM_SELF, 2, gap=gap), 1e-9)
-    assert loop.state.forces.contact == pytest.approx(0.02, abs=1e-9)
+    assert loop.state.multipliers.contact == pytest.approx(0.02, abs=1e-9)
 
 
 def test_the_single_loop_needs_no_outer_one():
@@ -125,7 +125,9 @@ def test_the_single_loop_needs_no_outer_one():
     loop = solve(problem, 1e-8, single_loop=True)
     assert len(loop.history) == 1
     twice = solve(bar(MPI.COMM_SELF, 32, law=Linear(1.0, 0.3)), 1e-8)
-    assert loop.state.forces.contact == pytest.approx(twice.state.forces.contact, abs=1e-8)
+    assert loop.state.multipliers.contact == pytest.approx(
+        twice.state.multipliers.contact, abs=1e-8
+    )
 
 
 def test_the_augmentation_parameter():
@@ -185,7 +187,7 @@ def test_a_start_from_the_solution_takes_one_step():
     problem = bar(MPI.COMM_SELF, 8)
     exact = solve(problem).state
     for disturbance in (0.0, 1e-3):
-        start = State((1 + disturbance) * exact.x, exact.forces)
+        start = State((1 + disturbance) * exact.x, exact.multipliers)
         loop = FixedPoint(problem, FixedPointOptions(tolerance=1e-9))
         state, outcome = loop.solve(start)
         assert outcome.converged
@@ -223,7 +225,7 @@ def test_nothing_to_do():
         problem = ContactProblem(example.domain, body, contact)
         loop = solve(problem)
         assert np.abs(loop.state.x).max() < 1e-14
-        assert np.abs(loop.state.forces.contact).max() < 1e-14
+        assert np.abs(loop.state.multipliers.contact).max() < 1e-14
     lifted = bar(MPI.COMM_SELF, 4, 0.005)
     gapped = ContactProblem(lifted.domain, lifted.description, Contact("bottom", flat(5.0)))
-    assert np.abs(solve(gapped).state.forces.contact).max() < 1e-13
+    assert np.abs(solve(gapped).state.multipliers.contact).max() < 1e-13

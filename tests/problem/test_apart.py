@@ -46,7 +46,7 @@ def test_a_body_beside_one_that_is_pressed_far_more(method, linear):
     beside = solve(pressed(blocks(COMM), 0.01, 0.01 * LITTLE), options, comm=COMM)
     exact = solve(pressed(blocks(COMM), 0.01, 0.01), NewtonOptions(tolerance=1e-12), comm=COMM)
     assert beside.converged, beside.outcome.reason
-    found, known = (of_second(one, one.state.forces.contact) for one in (beside, exact))
+    found, known = (of_second(one, one.state.multipliers.contact) for one in (beside, exact))
     assert np.linalg.norm(found / LITTLE - known) < 1e-8 * np.linalg.norm(known)
 
 
@@ -71,13 +71,13 @@ def test_where_nothing_touches_is_no_solution(beside):
     kept = problem.body.layout.points[:, 0] < 1.5
     x = np.where(np.repeat(kept, 2), state.x, 0.0)
     pressed_nodes = problem.nodes.points[:, 0] < 1.5
-    forces = replace(
-        state.forces,
-        contact=np.where(pressed_nodes, state.forces.contact, 0.0),
-        friction=state.forces.friction * pressed_nodes[:, None],
+    multipliers = replace(
+        state.multipliers,
+        contact=np.where(pressed_nodes, state.multipliers.contact, 0.0),
+        friction=state.multipliers.friction * pressed_nodes[:, None],
     )
     assert evaluate(problem, state).largest < 1e-8
-    assert evaluate(problem, State(x, forces)).equilibrium > 0.1
+    assert evaluate(problem, State(x, multipliers)).equilibrium > 0.1
 
 
 @pytest.mark.core
@@ -86,12 +86,12 @@ def test_the_laws_hold_on_each_body(beside, name):
     """A pressure of another sign, and a friction far beyond its bound."""
     problem, state = beside.problem, beside.state
     second = problem.nodes.points[:, 0] > 1.5
-    pressure, friction = state.forces.contact.copy(), state.forces.friction.copy()
+    pressure, friction = state.multipliers.contact.copy(), state.multipliers.friction.copy()
     if name == "contact":
         pressure[second] *= -1
     else:
         friction[second] *= 100
-    spoilt = State(state.x, replace(state.forces, contact=pressure, friction=friction))
+    spoilt = State(state.x, replace(state.multipliers, contact=pressure, friction=friction))
     assert getattr(evaluate(problem, spoilt), name) > 0.1
 
 
@@ -114,7 +114,7 @@ def test_charges_of_each_body():
     x, body = found.state.x.copy(), problem.body
     wrong = body.free[:, -1] & (body.layout.points[:, 0] > 1.5)
     body.nodal(x)[wrong, -1] = 0.0
-    assert evaluate(problem, State(x, found.state.forces)).equilibrium > 0.01
+    assert evaluate(problem, State(x, found.state.multipliers)).equilibrium > 0.01
 
 
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
@@ -128,7 +128,7 @@ def test_what_is_left_of_a_body_that_is_no_longer_loaded(method, linear):
     problem = ContactProblem(given.domain, body, given.contacts)
     found = solve_steps(problem, [1.0, 2.0], METHODS[method](linear=linear))
     assert found.converged, found.outcome.reason
-    assert np.abs(of_second(found, found.state.forces.contact)).max() < 1e-14
+    assert np.abs(of_second(found, found.state.multipliers.contact)).max() < 1e-14
 
 
 def test_forces_that_are_rounding_do_not_press():
@@ -140,13 +140,13 @@ def test_forces_that_are_rounding_do_not_press():
     found = solve_steps(problem, [1.0, 2.0])
     rng, nodes = np.random.default_rng(1), found.problem.nodes
     on_second = nodes.points[:, 0] > 1.5
-    x, forces = found.state.x.copy(), found.state.forces
+    x, multipliers = found.state.x.copy(), found.state.multipliers
     loaded = found.problem.body.layout.points[:, 0] > 1.5
     body = found.problem.body.nodal(x)
     body[loaded] = 1e-29 * rng.standard_normal(body[loaded].shape)
     body[~found.problem.body.free] = 0.0
     pressure = np.where(on_second, 6e-30 * rng.random(on_second.size), 0.0)
-    found.state = replace(found.state, x=x, forces=replace(forces, contact=pressure))
+    found.state = replace(found.state, x=x, multipliers=replace(multipliers, contact=pressure))
     assert np.abs(found.displacement.x.array).max() > 1e-3
     assert set(found.status) == {"open"}
     assert not [*rounding(found)]
@@ -202,7 +202,7 @@ def test_residuals_of_an_open_body():
     sunk[:, 1] = -0.01
     x = rest.x.copy()
     problem.nodes.add_jump_transposed(sunk, x)
-    assert evaluate(problem, State(x, rest.forces)).contact > 0.5
+    assert evaluate(problem, State(x, rest.multipliers)).contact > 0.5
 
 
 @pytest.mark.parametrize("method", ["newton", "uzawa"])
@@ -257,5 +257,5 @@ def test_a_body_that_has_flown_away_is_not_in_equilibrium():
     for distance in (1e6, 1e12, 1e15):
         x = problem.start().x.reshape(-1, 2).copy()
         x[:, 1] += distance
-        away = State(x.ravel(), problem.start().forces)
+        away = State(x.ravel(), problem.start().multipliers)
         assert evaluate(problem, away).equilibrium > 1e-3

@@ -110,7 +110,7 @@ def test_a_small_mesh_is_condensed_on_any_number_of_ranks(made):
     for comm in (WORLD, SELF):
         problem = made(comm)
         method = mechanics.newton(problem)
-        force = problem.nodes.norm(method.state.forces.contact)
+        force = problem.nodes.norm(method.state.multipliers.contact)
         found.append((force, method.counters.linear_solves))
     assert np.isclose(found[0][0], found[1][0], rtol=1e-9)
     assert found[0][1] == found[1][1]
@@ -126,11 +126,11 @@ def test_what_is_left_of_a_problem_has_the_same_residuals():
     left = condensation.linearise("secant", state)
     assert left is not None
     body = left.body
-    assert evaluate(left, State(body.x_0, state.forces)).largest < 1e-10
+    assert evaluate(left, State(body.x_0, state.multipliers)).largest < 1e-10
     x = body.updated(body.x_0, 1e-3 * np.where(body.free.ravel(), body.x_0, 0.0))
-    moved = evaluate(left, State(x, state.forces))
+    moved = evaluate(left, State(x, state.multipliers))
     whole = problem.body.updated(state.x, condensation.expand(left, x))
-    found = evaluate(problem, State(whole, state.forces))
+    found = evaluate(problem, State(whole, state.multipliers))
     assert np.isclose(moved.equilibrium, found.equilibrium, rtol=1e-3)
     assert moved.equilibrium > 1e-6
 
@@ -145,7 +145,7 @@ def test_a_condensed_body_is_no_body_that_has_lost_its_mesh():
         assert left.body.external(load).shape == (left.body.owned,)
         state = State(
             left.body.prescribe(left.body.zero_displacement(), load),
-            left.start().forces,
+            left.start().multipliers,
         )
         assert np.isfinite(evaluate(left, state).largest)
 
@@ -156,7 +156,7 @@ def test_slower_methods_work_at_the_contact_nodes_too():
     reference, method = mechanics.newton(problem), mechanics.newton(problem, max_iterations=2)
     assert "interior point" in method.history[0].note
     assert np.allclose(
-        method.state.forces.friction, reference.state.forces.friction, rtol=0, atol=1e-9
+        method.state.multipliers.friction, reference.state.multipliers.friction, rtol=0, atol=1e-9
     )
 
 

@@ -75,7 +75,7 @@ def test_each_field_is_out_of_balance_by_itself(top):
     shake = np.random.default_rng(0).choice((-1.0, 1.0), free.size) * free
     for field in (body.component_norms.mechanical, ~body.component_norms.mechanical):
         spoilt = state.x + 1e-4 * np.where(field, shake * np.abs(state.x[field]).max(), 0.0)
-        assert evaluate(problem, State(spoilt, state.forces)).equilibrium > 1e-5
+        assert evaluate(problem, State(spoilt, state.multipliers)).equilibrium > 1e-5
     assert evaluate(problem, state).equilibrium < TOLERANCE
 
 

@@ -32,26 +32,26 @@ class Solved:
     def __init__(self, problem):
         self.loop = solve(problem, SMALL)
         self.problem, self.nodes = problem, problem.nodes
-        self.state, self.forces = self.loop.state, self.loop.state.forces
+        self.state, self.multipliers = self.loop.state, self.loop.state.multipliers
         self.base = self.residuals()
         self.nodal = problem.nodal(self.state)
-        self.bound = problem.interface.bound(self.nodal, self.forces)
-        self.pressed = self.forces.contact > 1e-3 * self.forces.contact.max()
-        size = np.linalg.norm(self.forces.friction, axis=1)
+        self.bound = problem.interface.bound(self.nodal, self.multipliers)
+        self.pressed = self.multipliers.contact > 1e-3 * self.multipliers.contact.max()
+        size = np.linalg.norm(self.multipliers.friction, axis=1)
         self.sticks = self.pressed & (size < 0.95 * self.bound)
         self.slides = self.pressed & ~self.sticks & (size > 0.999 * self.bound)
-        self.open = self.forces.contact < 1e-9 * self.forces.contact.max()
+        self.open = self.multipliers.contact < 1e-9 * self.multipliers.contact.max()
 
-    def residuals(self, nodal=None, forces=None):
+    def residuals(self, nodal=None, multipliers=None):
         """Return the residuals with a displacement added at the contact nodes, or new forces."""
         x = self.state.x.copy()
         if nodal is not None:
             self.problem.nodes.add_jump_transposed(nodal, x)
-        return evaluate(self.problem, State(x, forces or self.forces))
+        return evaluate(self.problem, State(x, multipliers or self.multipliers))
 
     def along(self, chosen, component):
         """Return nodal vectors along the normal, or along the friction force where there is any."""
-        friction = self.forces.friction
+        friction = self.multipliers.friction
         size = np.linalg.norm(friction, axis=1)[:, None]
         unit = np.where(size > 0, friction / np.where(size > 0, size, 1), 0.0)
         directions = self.nodes.normal if component == "normal" else unit
@@ -90,7 +90,7 @@ def test_a_wrong_displacement_is_out_of_equilibrium(solved):
     body = problem.body
     shake = 1e-4 * random.standard_normal(body.owned) * body.free.ravel()
     shake.reshape(-1, body.block_size)[problem.nodes.nodes] = 0.0
-    found = evaluate(problem, State(solved.state.x + shake, solved.forces))
+    found = evaluate(problem, State(solved.state.x + shake, solved.multipliers))
     assert found.equilibrium > 1e-4
     assert found.contact <= SMALL
     assert found.friction <= SMALL
@@ -102,10 +102,10 @@ def test_rounding_is_a_small_part_of_the_loads(solved, monkeypatch):
     body = problem.body
     shake = np.random.default_rng(0).standard_normal(body.owned) * body.free.ravel()
     shake.reshape(-1, body.block_size)[problem.nodes.nodes] = 0.0
-    strict = evaluate(problem, State(solved.state.x + 1e-4 * shake, solved.forces))
+    strict = evaluate(problem, State(solved.state.x + 1e-4 * shake, solved.multipliers))
     monkeypatch.setattr(residuals, "MARGIN", 1e30)
     for size in (1e-4, 1e-4 * 2 * MOST_ROUNDING / strict.equilibrium):
-        found = evaluate(problem, State(solved.state.x + size * shake, solved.forces))
+        found = evaluate(problem, State(solved.state.x + size * shake, solved.multipliers))
         assert found.equilibrium > 0.99 * MOST_ROUNDING
 
 
@@ -133,7 +133,7 @@ def test_rounding_is_what_no_solve_gets_rid_of(degree):
     spoilt = state.x.copy()
     spoilt[: body.owned] += 1e-9 * body.free.ravel() * np.abs(spoilt).max()
     assert (
-        evaluate(problem, State(spoilt, state.forces)).equilibrium
+        evaluate(problem, State(spoilt, state.multipliers)).equilibrium
         > 100 * found.equilibrium_rounding
     )
 
@@ -151,33 +151,33 @@ def test_penetration_and_gaps_under_pressure_break_the_contact_law(solved):
 
 @pytest.mark.core
 def test_a_wrong_pressure(solved):
-    forces = solved.forces
-    pressure = forces.contact * np.where(solved.pressed, 1.01, 1.0)
-    found = solved.residuals(forces=replace(forces, contact=pressure))
+    multipliers = solved.multipliers
+    pressure = multipliers.contact * np.where(solved.pressed, 1.01, 1.0)
+    found = solved.residuals(multipliers=replace(multipliers, contact=pressure))
     assert found.equilibrium > 1e-4
     assert found.contact <= SMALL  # any pressure will do where the gap is closed
     if solved.slides.any():
         assert found.friction > 1e-4
-    glued = forces.contact - 1e-3 * forces.contact.max() * solved.open
+    glued = multipliers.contact - 1e-3 * multipliers.contact.max() * solved.open
     if solved.open.any():
-        assert solved.residuals(forces=replace(forces, contact=glued)).contact > 1e-5
-    pulled = replace(forces, contact=-forces.contact)
-    assert solved.residuals(forces=pulled).contact > 0.5
+        assert solved.residuals(multipliers=replace(multipliers, contact=glued)).contact > 1e-5
+    pulled = replace(multipliers, contact=-multipliers.contact)
+    assert solved.residuals(multipliers=pulled).contact > 0.5
 
 
 @pytest.mark.core
 def test_a_wrong_friction_force(solved):
-    forces = solved.forces
+    multipliers = solved.multipliers
     if solved.sticks.any():
         # A sticking node may carry any force within its bound.
-        less = forces.friction * np.where(solved.sticks, 0.9, 1.0)[:, None]
-        found = solved.residuals(forces=replace(forces, friction=less))
+        less = multipliers.friction * np.where(solved.sticks, 0.9, 1.0)[:, None]
+        found = solved.residuals(multipliers=replace(multipliers, friction=less))
         assert found.friction <= SMALL
         assert found.equilibrium > 1e-5
     if solved.slides.any():
         for factor in (0.9, 1.1, -1.0):
-            spoilt = forces.friction * np.where(solved.slides, factor, 1.0)[:, None]
-            found = solved.residuals(forces=replace(forces, friction=spoilt))
+            spoilt = multipliers.friction * np.where(solved.slides, factor, 1.0)[:, None]
+            found = solved.residuals(multipliers=replace(multipliers, friction=spoilt))
             assert found.friction > 1e-5
             assert found.contact <= SMALL
 
@@ -208,7 +208,7 @@ def test_the_bound_is_that_of_the_final_pressure_and_slip(solved):
 def test_a_query_changes_nothing(solved):
     """Residuals, forces and operators are those of the state that is asked for, in any order."""
     problem, body = solved.problem, solved.problem.body
-    other = State(0.3 * solved.state.x, solved.forces, 0.5)
+    other = State(0.3 * solved.state.x, solved.multipliers, 0.5)
     matrices = [body.create_matrix() for _ in range(2)]
     body.assemble(matrices[0], "secant", solved.state)
     first = evaluate(problem, solved.state), body.internal_forces(solved.state)
@@ -230,7 +230,7 @@ def test_a_node_without_numbers_far_from_all_others_is_no_equilibrium(solved):
     points = body.space.tabulate_dof_coordinates()
     middle = np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))
     body.nodal(x)[middle, 0] = np.nan
-    found = evaluate(solved.problem, State(x, solved.forces))
+    found = evaluate(solved.problem, State(x, solved.multipliers))
     assert np.isfinite(found.contact) and np.isfinite(found.friction)
     assert found.largest == np.inf
 

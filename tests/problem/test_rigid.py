@@ -83,7 +83,7 @@ def test_a_ball_rolls_to_where_no_moment_is_left(solver):
     case = indented(displacement=[0.05, "free"], force=[0.0, -0.01], rotation="free", moment=0.0)
     solution, moved = solved(case, SELF, solver)
     rigid, nodes = moved["rigid"], solution.problem.nodes
-    stress = solution.problem.interface.traction(solution.nodal, solution.forces)
+    stress = solution.problem.interface.traction(solution.nodal, solution.multipliers)
     force = nodes.weight[:, None] * stress
     arm = nodes.points - np.array([1.0, 2.0])
     moment = np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
@@ -122,7 +122,7 @@ def test_residuals_see_an_indenter_out_of_balance():
     case = indented(displacement=[0.0, "free"], force=[0.0, -0.01])
     problem = build_problem(case, SELF)
     state = state_of(problem, 1e-8)
-    less = Multipliers(0.9 * state.forces.contact, 0.9 * state.forces.friction)
+    less = Multipliers(0.9 * state.multipliers.contact, 0.9 * state.multipliers.friction)
     residual = residual_forces(problem, State(state.x, less))
     q = problem.body.motion(problem.body.unbalanced(residual))
     # A tenth of the force is missing, and what is given bears its reaction.
@@ -291,7 +291,7 @@ def test_a_free_plate_loads_two_bodies(how):
     else:
         state = state_of(problem, 1e-10, condense=how == "condensed")
     nodes = problem.nodes
-    stress = problem.interface.traction(problem.nodal(state), state.forces)
+    stress = problem.interface.traction(problem.nodal(state), state.multipliers)
     force = nodes.weight[:, None] * stress
     # What the upper body exerts on the lower one is what acts on the plate.
     assert force.sum(axis=0) == pytest.approx([0.001, -0.01], abs=1e-12)

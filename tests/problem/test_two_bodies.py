@@ -160,7 +160,7 @@ def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
 def test_ranks_agree(dim, condense):
     def quantities(problem):
         nodes, state = problem.nodes, state_of(problem, 1e-12, condense)
-        values = {"points": nodes.points, "forces": state.forces.vectors(nodes)}
+        values = {"points": nodes.points, "forces": state.multipliers.vectors(nodes)}
         return {name: at_all(nodes.comm, nodes.points, x) for name, x in values.items()}
 
     agree(lambda ranks: pushed(ranks, 1, dim), quantities, rtol=0, atol=1e-11)

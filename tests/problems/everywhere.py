@@ -34,7 +34,7 @@ def displacements(loop):
 def pressures(loop):
     """Return the pressures of all contact nodes, shape (nodes,), on every rank. Collective."""
     nodes = loop.problem.nodes
-    return at_all(nodes.comm, nodes.points, loop.state.forces.contact)
+    return at_all(nodes.comm, nodes.points, loop.state.multipliers.contact)
 
 
 def at_all(comm, points, values):

@@ -36,8 +36,8 @@ def close(one: State, two: State, rtol: float = 0.0, atol: float = 0.0) -> bool:
     """Tell whether two states have the same values on this rank."""
     pairs = (
         (one.x, two.x),
-        (one.forces.contact, two.forces.contact),
-        (one.forces.friction, two.forces.friction),
+        (one.multipliers.contact, two.multipliers.contact),
+        (one.multipliers.friction, two.multipliers.friction),
     )
     return (
         same_history(one.history, two.history, rtol, atol)
@@ -260,19 +260,19 @@ def at_points(solution: Solution, name: str) -> Array:
 
 def contact_data(loop: FixedPoint) -> dict[str, Array]:
     """Return what there is at all contact nodes, sorted by position."""
-    problem, nodes, forces = loop.problem, loop.problem.nodes, loop.state.forces
+    problem, nodes, multipliers = loop.problem, loop.problem.nodes, loop.state.multipliers
     nodal = problem.nodal(loop.state)
     slip = nodes.tangential_component(nodal)
-    bound = problem.interface.friction.bound(forces.contact, np.linalg.norm(slip, axis=1))
-    size = np.linalg.norm(forces.friction, axis=1)
+    bound = problem.interface.friction.bound(multipliers.contact, np.linalg.norm(slip, axis=1))
+    size = np.linalg.norm(multipliers.friction, axis=1)
     local = {
         "points": nodes.points,
         "u_n": nodes.normal_component(nodal),
         "u_t": slip,
-        "pressure": forces.contact,
-        "friction": forces.friction,
+        "pressure": multipliers.contact,
+        "friction": multipliers.friction,
         "bound": np.asarray(bound, dtype=float),
-        "open": forces.contact <= 1e-6 * nodes.maximum(forces.contact),
+        "open": multipliers.contact <= 1e-6 * nodes.maximum(multipliers.contact),
         "sticks": size < 0.9999 * bound,
     }
     data = {name: nodes.gather(values) for name, values in local.items()}

@@ -310,7 +310,7 @@ def test_the_energy_of_a_piezoelectric_body(dim):
     at = fields_of(body, material, body.function(x))
     field = -ufl.grad(body.split(body.function(x))[1])
     density = ufl.inner(at["stress"], at["strain"]) + ufl.dot(at["electric_displacement"], field)
-    found = estimated(problem, State(x, start.forces))
+    found = estimated(problem, State(x, start.multipliers))
     assert found.energy == pytest.approx(fem.assemble_scalar(fem.form(density * domain.dx)))
     assert found.total > 0
 

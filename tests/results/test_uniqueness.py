@@ -342,8 +342,10 @@ def test_a_coarse_state_is_linear_between_its_nodes_on_any_ranks():
     coarse, fine = (build_problem(bar(f"mesh.cells={cells}")) for cells in ("[16, 4]", "[64, 16]"))
     x = coarse.nodes.points[:, 0]
     ends = -coarse.nodes.maximum(-x, -np.inf), coarse.nodes.maximum(x)
-    forces = Multipliers.of(coarse.nodes, 1 + x, np.zeros((x.size, 2)))
-    found = prolong(coarse, replace(coarse.start(), forces=forces), fine).forces.contact
+    multipliers = Multipliers.of(coarse.nodes, 1 + x, np.zeros((x.size, 2)))
+    found = prolong(
+        coarse, replace(coarse.start(), multipliers=multipliers), fine
+    ).multipliers.contact
     at = fine.nodes.points[:, 0]
     between = (at >= ends[0]) & (at <= ends[1])
     assert fine.comm.allreduce(int(between.sum())) > 50

@@ -37,7 +37,9 @@ def test_a_node_that_begins_to_slide_goes_on():
     nodes = solution.problem.nodes
     slip = solution.problem.interface.slip_length(nodes.jump(solution.state.x))
     slides = (slip > 1e-6) & (solution.pressure > 1e-9)
-    ratio = np.linalg.norm(solution.forces.friction, axis=1)[slides] / solution.pressure[slides]
+    ratio = (
+        np.linalg.norm(solution.multipliers.friction, axis=1)[slides] / solution.pressure[slides]
+    )
     coefficient = SlipCoefficient(1 / 12, 1 / 30, 6e7)
     assert slides.sum() > 50
     np.testing.assert_allclose(ratio, coefficient(slip[slides]), rtol=1e-6)

@@ -197,7 +197,7 @@ def test_the_iterative_solver_knows_the_one_rigid_motion(comm):
     state, outcome = loop.solve()
     assert outcome.converged
     scale = direct.problem.nodes.maximum(direct.pressure)
-    assert np.abs(state.forces.contact - direct.pressure).max(initial=0.0) < 1e-6 * scale
+    assert np.abs(state.multipliers.contact - direct.pressure).max(initial=0.0) < 1e-6 * scale
 
 
 @pytest.mark.core

@@ -178,7 +178,7 @@ def test_other_friction_laws_on_a_layer(law):
     assert np.any(slips)
     # The bound holds the layer's part of the pressure too.
     layer = problem.interface.foundation.layer_pressure(solution.nodal)
-    total = solution.forces.contact + layer
+    total = solution.multipliers.contact + layer
     slip = np.linalg.norm(solution.slip, axis=1)
     bound = 0.5 if law == "tresca" else laws[law].mu(slip) * total
     assert np.allclose(size[slips], np.broadcast_to(bound, slip.shape)[slips], rtol=1e-6)

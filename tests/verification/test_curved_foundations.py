@@ -131,7 +131,7 @@ def test_a_curvature_that_varies(cells, most):
     }  # fmt: skip
     solution = solve(parse_case(case), domain=domain)
     nodes, exact = solution.problem.nodes, 1e-3 * 1000 / (1.3 * 0.4)
-    assert nodes.maximum(np.abs(solution.forces.contact / exact - 1)) < most
+    assert nodes.maximum(np.abs(solution.multipliers.contact / exact - 1)) < most
 
 
 @pytest.mark.parametrize("degree", [1, 2])

@@ -41,10 +41,10 @@ def away(size, **bodies):
     """Return by how much friction and pressure are off, over their sums."""
     problem = profiles(size, **bodies)
     *_, last = evolve(problem, [1.0, 2.0], NewtonOptions())
-    weight, pressure = problem.nodes.weight, last.forces.contact
-    friction = last.forces.friction[:, 0] * np.sign(weight @ last.forces.friction[:, 0])
+    weight, pressure = problem.nodes.weight, last.multipliers.contact
+    friction = last.multipliers.friction[:, 0] * np.sign(weight @ last.multipliers.friction[:, 0])
     smooth = profiles(size, **bodies, mu=None)
-    presses = [s.forces.contact for s in evolve(smooth, np.linspace(0, 1, 41)[1:])]
+    presses = [s.multipliers.contact for s in evolve(smooth, np.linspace(0, 1, 41)[1:])]
     loads = np.array([weight @ p for p in presses])
 
     def under(load):

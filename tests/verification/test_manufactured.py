@@ -42,11 +42,11 @@ def test_hencky_orders(dim, degree, cells):
 def test_signorini_pressure():
     solution = Singular()
     problem = solution.problem(64)
-    nodes, forces = problem.nodes, state_of(problem, 1e-10).forces
-    error = forces.contact - solution.pressure(nodes.points)
+    nodes, multipliers = problem.nodes, state_of(problem, 1e-10).multipliers
+    error = multipliers.contact - solution.pressure(nodes.points)
     # The pressure is one of a corner, where Dirichlet data meet contact, and is left out there.
     inner = nodes.points[:, 0] < 0.9
-    assert nodes.norm(error * inner) < 0.05 * nodes.norm(forces.contact)
+    assert nodes.norm(error * inner) < 0.05 * nodes.norm(multipliers.contact)
 
 
 ONE, OTHER = Linear(1.0, 0.3), Linear(3.0, 0.2)
@@ -90,8 +90,8 @@ def test_pressures_friction_and_slip(dim, cells, most, order, laws):
         found = [
             nodes.norm(value - given) / nodes.norm(given)
             for given, value in (
-                (block.pressure(x), state.forces.contact),
-                (block.friction(x), state.forces.friction @ along),
+                (block.pressure(x), state.multipliers.contact),
+                (block.friction(x), state.multipliers.friction @ along),
                 (block.slip(x), slip @ along),
             )
         ]
@@ -107,7 +107,7 @@ def test_layers_with_current():
     for n in (8, 16):
         problem = layers.problem(n, 1)
         state = state_of(problem, 1e-10)
-        pressure = state.forces.contact[1:-1]
+        pressure = state.multipliers.contact[1:-1]
         assert pressure == pytest.approx(layers.PRESSURE * layers.law.young, rel=0.02)
         assert problem.interface.slip_length(problem.nodal(state)) == pytest.approx(layers.SLIP)
         e = errors(problem.body, state.x, layers.fields)

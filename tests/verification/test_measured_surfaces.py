@@ -217,7 +217,7 @@ def test_a_rough_profile_beside_a_half_plane_code(tmp_path):
     solution = solve(pressed(foundation, approach=2e-3, size=0.005))
     assert solution.converged
     force, nodes = 2 * solution.contact_force[1], solution.problem.nodes
-    pressure = solution.state.forces.contact
+    pressure = solution.state.multipliers.contact
     ratio = nodes.weight[pressure > 1e-6 * pressure.max()].sum() / nodes.weight.sum()
     middle = -1.0 + (np.arange(800) + 0.5) / 400
     known = half_plane(middle, np.interp(middle, x, heights), abs(force))

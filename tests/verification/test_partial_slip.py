@@ -57,7 +57,7 @@ def sheared(elements, ways):
 def stick(problem, state):
     """Return |q|/p at the contact node nearest the middle, mu (1 - c/a) of the closed form."""
     at = int(np.argmin(np.linalg.norm(problem.nodes.points[:, :-1], axis=1)))
-    return float(np.linalg.norm(state.forces.friction[at]) / state.forces.contact[at])
+    return float(np.linalg.norm(state.multipliers.friction[at]) / state.multipliers.contact[at])
 
 
 def forces(solution, step):

@@ -42,7 +42,7 @@ def test_normals_are_the_body_s_own_for_a_given_gap():
         )
         assert np.abs(with_plane.nodes.normal - with_gap.nodes.normal).max() < 1e-12
         loop = solve(with_gap, 1e-11)
-        assert loop.state.forces.contact == pytest.approx(block.pressure, abs=1e-9)
+        assert loop.state.multipliers.contact == pytest.approx(block.pressure, abs=1e-9)
 
 
 @pytest.mark.core

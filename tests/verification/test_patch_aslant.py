@@ -235,7 +235,7 @@ def test_a_side_that_is_moved_along_the_foundation_in_time():
     for time, state in zip(
         (0.25, 1.0), evolve(problem, [0.25, 1.0], METHODS["dense"]), strict=True
     ):
-        np.testing.assert_allclose(state.forces.contact, time * PRESSURE, rtol=1e-10)
+        np.testing.assert_allclose(state.multipliers.contact, time * PRESSURE, rtol=1e-10)
         nodal, nodes = problem.nodal(state), problem.nodes
         at_side = nodes.points[:, 0] < 1e-9
         lift = time * shift * SLOPE

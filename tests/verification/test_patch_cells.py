@@ -47,7 +47,7 @@ def test_uniform_pressure(cell: str, degree: int, element: str, condense: bool) 
         domain, body, Contact("bottom", ground(dim)), degree=degree, element=element
     )
     state = state_of(problem, condense=condense)
-    np.testing.assert_allclose(state.forces.contact, 0.02, rtol=1e-12)
+    np.testing.assert_allclose(state.multipliers.contact, 0.02, rtol=1e-12)
     stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
     np.testing.assert_allclose(stress[:, 4 * (dim - 1)], -0.02, rtol=1e-10)
     assert problem.nodes.weight.min(initial=1.0) > 1e-3
@@ -79,7 +79,7 @@ def test_constant_shear_under_stick(cell: str, degree: int, element: str) -> Non
     state = state_of(problem, 1e-13)
     x = problem.body.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ gradient.T, rtol=0, atol=1e-12)
-    vectors = state.forces.vectors(problem.nodes)
+    vectors = state.multipliers.vectors(problem.nodes)
     np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
 
 
@@ -104,7 +104,7 @@ def test_discs_about_an_axis(degree: int, element: str, law: str) -> None:
     assert problem.nodes.sum(np.ones(problem.nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
     stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
     np.testing.assert_allclose(np.delete(stress, 4, axis=1), 0, atol=1e-10)
-    pressure = problem.nodes.gather(state.forces.contact)
+    pressure = problem.nodes.gather(state.multipliers.contact)
     np.testing.assert_allclose(pressure, -stress[0, 4] if len(stress) else pressure, atol=1e-10)
     if law == "linear":
         np.testing.assert_allclose(pressure, 0.02, rtol=1e-10)

@@ -86,7 +86,7 @@ def check_constant_pressure(
     body = Body(materials, fixed, [load])
     problem = ContactProblem(domain, body, contact(*pair), degree=degree)
     state = state_of(problem, condense=dense)
-    np.testing.assert_allclose(state.forces.contact, 0.01, rtol=1e-12)
+    np.testing.assert_allclose(state.multipliers.contact, 0.01, rtol=1e-12)
     stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
     k = 4 * (dim - 1)
     np.testing.assert_allclose(stress[:, k], -0.01, rtol=1e-10)
@@ -190,7 +190,7 @@ def check_constant_stress(given: Blocks, degree: int, pair: Sequence[str], *furt
     body = Body(LAW, [Fixed("bottom", [Affine(tuple(row)) for row in strain]), *further], loads)
     problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
     state = check_linear(problem, strain)
-    vectors = state.forces.vectors(problem.nodes)
+    vectors = state.multipliers.vectors(problem.nodes)
     np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
 
 
@@ -241,7 +241,7 @@ def test_matching_meshes_are_one_body(dim: int, degree: int, cell: str) -> None:
         given.domain(MPI.COMM_SELF), body, contact("under", "over", 50.0), degree=degree
     )
     state = state_of(two, 1e-12)
-    assert (state.forces.contact > 0).all()
+    assert (state.multipliers.contact > 0).all()
     joined = given.joined(MPI.COMM_SELF)
     far = GapFunction(lambda points: np.full(len(points), 1e3))
     one = ContactProblem(joined, body, Contact("top", far), degree=degree)
@@ -268,7 +268,7 @@ def test_a_chain_of_bodies(degree: int, condense: bool) -> None:
     body = Body(materials, fixed, [Load("top2", pressure=constant(0.01, 2))])
     pairs = [contact("bottom1", "top0"), contact("bottom2", "top1")]
     state = state_of(ContactProblem(domain, body, pairs, degree=degree), condense=condense)
-    np.testing.assert_allclose(state.forces.contact, 0.01, rtol=1e-12)
+    np.testing.assert_allclose(state.multipliers.contact, 0.01, rtol=1e-12)
 
 
 @pytest.mark.core
@@ -287,4 +287,4 @@ def test_a_corner_that_is_on_one_body_and_against_another(degree: int, condense:
     problem = ContactProblem(domain, body, pairs, degree=degree)
     state = state_of(problem, condense=condense)
     expected = np.where(np.abs(problem.nodes.normal[:, 0]) > 0.5, 0.02, 0.01)
-    np.testing.assert_allclose(state.forces.contact, expected, rtol=1e-12)
+    np.testing.assert_allclose(state.multipliers.contact, expected, rtol=1e-12)

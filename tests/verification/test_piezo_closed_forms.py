@@ -57,7 +57,7 @@ def test_column(name, dim, units):
     problem = column.problem(COMM, dim, units)
     solver = solve(problem, 1e-12)
     assert max(errors(solver, column, units)) < 1e-10
-    pressure = solver.state.forces.contact / units.stress
+    pressure = solver.state.multipliers.contact / units.stress
     assert np.allclose(pressure, column.pressure, rtol=1e-10)
 
 

@@ -31,7 +31,7 @@ def extremes(solver):
         -nodes.maximum(-phi, -np.inf),
         nodes.maximum(phi, -np.inf),
         problem.comm.allreduce(np.abs(u).max(), MPI.MAX),
-        nodes.maximum(state.forces.contact),
+        nodes.maximum(state.multipliers.contact),
     )
 
 
@@ -98,7 +98,7 @@ def test_ranks_agree(law):
     def quantities(solver):
         state, problem = solver.state, solver.problem
         return dict(enumerate(extremes(solver))) | {
-            "pressure": problem.nodes.norm(state.forces.contact),
+            "pressure": problem.nodes.norm(state.multipliers.contact),
             "potential": problem.nodes.norm(potential(problem, state)),
             "charge": charge_balance(problem, state).foundation,
         }

@@ -68,7 +68,7 @@ def pressed(n: int, far: float, revolved: bool, motion: Motion):
     method = punched(n, far, revolved, motion)
     problem, state = method.problem, method.state
     # Nothing lifts off.
-    assert np.all(state.forces.contact > 0)
+    assert np.all(state.multipliers.contact > 0)
     return problem, state, movements(problem, state)["rigid"]
 
 
@@ -78,7 +78,7 @@ def test_a_moment_tilts_a_flat_punch():
     problem, state, moved = pressed(7, 20.0, False, TILTED)
     theta = 4 * (1 - NU**2) * MOMENT / np.pi
     assert np.deg2rad(moved["rotation"]) == pytest.approx(theta, rel=5e-3)
-    nodes, pressure = problem.nodes, state.forces.contact
+    nodes, pressure = problem.nodes, state.multipliers.contact
     assert nodes.weight @ pressure == pytest.approx(FORCE, rel=1e-12)
     # The moment of the pressure upwards on the punch balances that which is given.
     assert nodes.weight @ (nodes.points[:, 0] * pressure) == pytest.approx(-MOMENT, rel=1e-12)

@@ -156,8 +156,10 @@ def test_overlaps_beside_soft_parts_of_a_side():
     place = problem.body.space.tabulate_dof_coordinates()[: len(u)]
     u[place[:, 1] < 0.5, 0] = 0.1 * place[place[:, 1] < 0.5, 0]
     for pressed in (1e-4, 1e-2):
-        forces = replace(start.forces, contact=np.full_like(start.forces.contact, pressed))
-        said.append(len([*rounded_overlaps(problem, replace(start, x=x, forces=forces))]))
+        multipliers = replace(
+            start.multipliers, contact=np.full_like(start.multipliers.contact, pressed)
+        )
+        said.append(len([*rounded_overlaps(problem, replace(start, x=x, multipliers=multipliers))]))
     assert said == [1, 0]
 
 

@@ -40,10 +40,10 @@ OWN = "chord step", "tangent", "rejected", "initial guess"
 
 def along_normal(solution: Solution) -> float:
     """Return the largest normal component of friction over the largest stress."""
-    nodes, forces = solution.problem.nodes, solution.forces
+    nodes, multipliers = solution.problem.nodes, solution.multipliers
     # Of bodies that touch nothing both are rounding; their squares may underflow.
-    scale = max(np.abs(f).max(initial=0.0) for f in (forces.contact, forces.friction))
-    largest = np.abs(nodes.normal_component(forces.friction)).max(initial=0.0)
+    scale = max(np.abs(f).max(initial=0.0) for f in (multipliers.contact, multipliers.friction))
+    largest = np.abs(nodes.normal_component(multipliers.friction)).max(initial=0.0)
     return float(largest / max(scale, 1e-300))
 
 

@@ -182,9 +182,9 @@ def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
     """Return the layer linearised about the displacement alone."""
 
     def plain(interface: Any, nodal: Any, state: Any, of: Any, full: bool) -> Any:
-        forces = replace(state.forces, contact=0.0 * state.forces.contact)
+        multipliers = replace(state.multipliers, contact=0.0 * state.multipliers.contact)
         layer = interface.foundation.layer_pressure(nodal)
-        about = replace(state, forces=forces, layer_pressure=layer)
+        about = replace(state, multipliers=multipliers, layer_pressure=layer)
         return old(interface, nodal, about, of, full)
 
     return plain
