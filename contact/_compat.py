@@ -147,8 +147,8 @@ def take_schur_complement(factor: PETSc.Mat, size: int) -> npt.NDArray[np.float6
     PETSc multiplies reduced right-hand sides by the inverse of its own one: the identity is left.
     """
     handle, values, status = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_int()
-    held = ctypes.c_void_p(factor.handle), ctypes.byref(handle)
-    _check(_petsc.MatFactorGetSchurComplement(*held, ctypes.byref(status)))
+    handles = ctypes.c_void_p(factor.handle), ctypes.byref(handle)
+    _check(_petsc.MatFactorGetSchurComplement(*handles, ctypes.byref(status)))
     _check(_petsc.MatDenseGetArray(handle, ctypes.byref(values)))
     pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
     there = np.ctypeslib.as_array(pointer, (size, size))
@@ -156,7 +156,7 @@ def take_schur_complement(factor: PETSc.Mat, size: int) -> npt.NDArray[np.float6
     there[:] = 0.0
     np.fill_diagonal(there, 1.0)
     _check(_petsc.MatDenseRestoreArray(handle, ctypes.byref(values)))
-    _check(_petsc.MatFactorRestoreSchurComplement(*held, INVERTED))
+    _check(_petsc.MatFactorRestoreSchurComplement(*handles, INVERTED))
     return matrix
 
 

@@ -76,8 +76,8 @@ def write_outputs(
     if isinstance(folder, ResultFolder):
         _replace(solution, folder, figures)
     else:
-        with result_folder(folder, solution.problem.comm) as held:
-            _replace(solution, held, figures)
+        with result_folder(folder, solution.problem.comm) as place:
+            _replace(solution, place, figures)
 
 
 def written(solution: Results) -> Run | None:

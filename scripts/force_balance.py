@@ -32,8 +32,8 @@ class ForceBalance:
     def imbalance(self) -> float:
         """The norm of the sum over the sum of the norms, for contact those of `passed`.
 
-        Two bodies that are both held have no other resultant than the force between them, and
-        none at all apart: 0 where all is rounding.
+        Two bodies that are both constrained have no other resultant than the force between them,
+        and none at all apart: 0 where all is rounding.
         """
         parts = self.applied, self.supports, *self.passed
         scale = sum(float(np.linalg.norm(part)) for part in parts)

@@ -109,7 +109,7 @@ SECTIONS: Mapping[str, str] = {
     q.BODY: "At the nodes. All but displacement and potential are averages of the cells around a "
     "node, weighted by volume, within each region: a node between regions is a point of "
     "each. NAME`_cell` has the values of the cells.",
-    q.SURFACE: "At the nodes; `nan` where a node is held and therefore not a contact node.",
+    q.SURFACE: "At the nodes; `nan` where a node is constrained and therefore not a contact node.",
     q.OPPOSITE: "",
 }
 

@@ -580,7 +580,7 @@ def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
     assert (counters.factorizations, counters.linear_solves) == (1, 5)
     assert counters.linear_iterations <= 5 * fresh + PRICE
     before = counters.linear_iterations
-    # Nothing holds the nodes, and the coarse levels take them for held.
+    # Nothing holds the nodes, and the coarse levels take them for constrained.
     operator.update("secant", BodyState(x), 0 * sticks)
     found = operator.solve(load, 1e-6)
     assert counters.factorizations == 2
@@ -590,12 +590,12 @@ def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
     assert body.norm(found - direct.solve(load)) <= 1e-5 * body.norm(found)
 
 
-@pytest.mark.parametrize("held", [True, False])
-def test_multigrid_converges_for_two_bodies_as_for_one(held, monkeypatch):
+@pytest.mark.parametrize("constrained", [True, False])
+def test_multigrid_converges_for_two_bodies_as_for_one(constrained, monkeypatch):
     # Small systems have no coarse levels otherwise.
     options = {**multigrid.DEFAULTS, "pc_gamg_coarse_eq_limit": "200"}
     monkeypatch.setattr(multigrid, "DEFAULTS", options)
-    problem, counters = two_blocks(held), Counters()
+    problem, counters = two_blocks(constrained), Counters()
     method = Newton(
         problem,
         NewtonOptions(tolerance=1e-8, condense=False, linear="iterative"),

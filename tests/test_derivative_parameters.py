@@ -283,7 +283,7 @@ def block(material=None, **more):
 
 @pytest.mark.parametrize("method", ["tangent", "adjoint"])
 def test_all_nodes_have_the_largest_displacement(method):
-    """Lifted off: the derivative is that at one node, held or free."""
+    """Lifted off: the derivative is that at one node, constrained or free."""
     run = solve(block(fixed=[{"on": "top", "displacement": [-0.003, 0.004]}]), comm=SELF)
     key = "fixed.0.displacement.0"
     found = sensitivity(run, ["max_displacement"], [key], method)["max_displacement"][key]

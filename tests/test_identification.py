@@ -112,7 +112,7 @@ def with_columns(given, columns):
 
 
 def loaded(mu=0.3):
-    """Return the block with a load on its held top, and two equal ones on its left side."""
+    """Return the block with a load on its constrained top, and two equal ones on its left side."""
     data = evolving(block())
     data["fixed"][1]["displacement"] = [data["fixed"][1]["displacement"][0], "free"]
     load = {"traction": [0.002, 0.0], "amplitude": "constant"}

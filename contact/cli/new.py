@@ -103,7 +103,7 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
     if len(order) < 2:
         raise InputError(
             f"{mesh}: {', '.join(sorted(heights))} as parts: none to hold beside that in contact; "
-            "accepted: a mesh that also names the sides that are held and pressed",
+            "accepted: a mesh that also names the sides that are constrained and pressed",
             "new-parts",
         )
     lowest, highest = order[0], order[-1]
@@ -117,8 +117,8 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
         contacts += 'overlap = "press"             # the meshes overlap\n' if gap < 0 else ""
     if facing:
         closed = float(np.ceil(max(facing[0][0], 0.0) / step - NEGLIGIBLE))
-        held = f"on = {literal(lowest)}\ndisplacement = {_along(d, 0.0)}\n"
-        contacts = f"\n[[fixed]]\n{held}{contacts}"
+        support = f"on = {literal(lowest)}\ndisplacement = {_along(d, 0.0)}\n"
+        contacts = f"\n[[fixed]]\n{support}{contacts}"
     else:
         least = domain.mesh.geometry.x[:, d - 1].min(initial=np.inf)
         ground = _along(d, domain.comm.allreduce(float(least), op=MPI.MIN) + 0.0)

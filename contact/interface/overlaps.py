@@ -199,11 +199,11 @@ class _Boundaries:
         inward = -of_cells.facet_normals
         begin = of_cells.nodes(1)[of_cells.facet_corners[:, 0]]
         height = np.einsum("pfd,fd->pf", at[:, None] - begin, inward)
-        held = height.min(axis=1, initial=np.inf) >= -NEGLIGIBLE
+        inside = height.min(axis=1, initial=np.inf) >= -NEGLIGIBLE
         functions = of_cells.lagrange(of_cells.degree_of(cells.shape[1]), at)
         missed = np.einsum("pk,pkd->pd", functions, cells[cell]) - there[point]
-        held &= np.linalg.norm(missed, axis=1) <= NEGLIGIBLE * domain.size
-        point, other = point[held], component[cell[held]]
+        inside &= np.linalg.norm(missed, axis=1) <= NEGLIGIBLE * domain.size
+        point, other = point[inside], component[cell[inside]]
         _, number, other = exchanged(comm, source[point], number[point], other)
         number, other = np.unique(np.column_stack([number, other]), axis=0).T
         return number, other
@@ -213,8 +213,8 @@ class _Boundaries:
         near = np.zeros(len(x), dtype=bool)
         for body, (low, high) in enumerate(zip(*self.body.boxes, strict=True)):
             accepted = self.body.accepted_overlaps(of, np.full_like(of, body))[:, None]
-            held = np.all((x > low + accepted) & (x < high - accepted), axis=1)
-            near |= held & (of != body)
+            inside = np.all((x > low + accepted) & (x < high - accepted), axis=1)
+            near |= inside & (of != body)
         return near
 
     def depths(

@@ -167,7 +167,7 @@ def find_pair(
             raise _overlap(max(overlap), True, False, label)
         raise InputError(
             f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
-            "held there; accepted: sides of two bodies that look at each other",
+            "constrained there; accepted: sides of two bodies that look at each other",
             "pair",
         )
     _check_apart(body, coupling, slave.owners, label)

@@ -245,7 +245,7 @@ def find_nodes(
     A node whose contact direction supports hold, or that follows a rigid part, is left out. Where
     they hold it aslant to that, as a plane of symmetry beside an inclined foundation does, it is
     met by the displacements that are free and those that are prescribed; the force along directions
-    that are held is borne by the supports. Friction acts along the directions of
+    that are constrained is borne by the supports. Friction acts along the directions of
     `ContactNodes.tangent`.
 
     With `press` a shape may cut the body in the reference configuration. Where the foundation

@@ -84,10 +84,10 @@ def result_folder(
     they may be overwritten.
     """
     path = Path(path)
-    held, together = ExitStack(), False
-    on_root(comm, lambda: _take(held, path, overwrite))
+    stack, together = ExitStack(), False
+    on_root(comm, lambda: _take(stack, path, overwrite))
     try:
-        with held:
+        with stack:
             yield ResultFolder(path, comm)
         together = True
     except InputError:  # wrong input is so on all ranks
@@ -98,19 +98,19 @@ def result_folder(
             comm.barrier()
 
 
-def _take(held: ExitStack, path: Path, overwrite: bool) -> None:
+def _take(stack: ExitStack, path: Path, overwrite: bool) -> None:
     """Make, lock and check a folder until the stack is left, or at once where that fails."""
     with ExitStack() as making:
         _lock_and_check(making, path, overwrite)
-        held.push(making.pop_all())
+        stack.push(making.pop_all())
 
 
-def _lock_and_check(held: ExitStack, path: Path, overwrite: bool) -> None:
+def _lock_and_check(stack: ExitStack, path: Path, overwrite: bool) -> None:
     try:
         for place in [p for p in (path, *path.parents) if not p.exists()][::-1]:
             place.mkdir()
-            held.callback(_remove_empty, place)
-        held.enter_context(_locked(path))
+            stack.callback(_remove_empty, place)
+        stack.enter_context(_locked(path))
         settle(path)
     except OSError as error:
         reason = error.strerror or "not writable"

@@ -77,9 +77,9 @@ def _with_rings(owners: Owners, *arrays: NDArray[Any]) -> tuple[NDArray[Any], ..
     # The owner of a vertex is told which ranks have facets there.
     comm, own = owners.comm, arrays[0]
     vertices = np.unique(own)
-    holder, held = exchanged(comm, owners.ranks(vertices), vertices)
-    order = np.argsort(held, kind="stable")
-    holder, held = holder[order], held[order]
+    holder, held_vertex = exchanged(comm, owners.ranks(vertices), vertices)
+    order = np.argsort(held_vertex, kind="stable")
+    holder, held_vertex = holder[order], held_vertex[order]
     by_vertex = np.argsort(own.ravel(), kind="stable")
     at = own.ravel()[by_vertex]
     every, asked = [arrays], np.zeros(0, dtype=np.int64)
@@ -89,7 +89,7 @@ def _with_rings(owners: Owners, *arrays: NDArray[Any]) -> tuple[NDArray[Any], ..
         fresh = np.setdiff1d(np.concatenate([facets[0].ravel() for facets in every]), asked)
         asked = np.union1d(asked, fresh)
         asking, vertex = exchanged(comm, owners.ranks(fresh), fresh)
-        row, found = _runs(held, vertex)
+        row, found = _runs(held_vertex, vertex)
         other = holder[found] != asking[row]
         to, row = holder[found][other], row[other]
         _, asking, vertex = exchanged(comm, to, asking[row], vertex[row])

@@ -33,7 +33,7 @@ def position(table: Table, run: Run) -> tuple[Array, str, tuple[float, float]]:
     """Return the positions of nodes along Gamma_3, the label of the axis, and its ends."""
     # On the coordinate over which it is a graph, of two the one along which it is longer; else the
     # arc length.
-    points, outer = np.column_stack([table["x"], table["y"]]), ends(table, run.held)
+    points, outer = np.column_stack([table["x"], table["y"]]), ends(table, run.constrained)
     extent = np.ptp(points, axis=0)
     for axis in (0, 1) if extent[0] >= extent[1] else (1, 0):
         steps = np.diff(points[:, axis])
@@ -75,15 +75,15 @@ def inside(table: Table, run: Run, name: str, limits: tuple[float, float]) -> Ar
     return table[name][(where >= limits[0]) & (where <= limits[1])]
 
 
-def ends(table: Table, held: Array) -> Array:
-    """Return the ends of Gamma_3, (2, 2): contact nodes, or held ones, (n, 2), beside these."""
+def ends(table: Table, constrained: Array) -> Array:
+    """Return the ends of Gamma_3, (2, 2): contact nodes, or `constrained` ones, (n, 2), beside."""
     points = np.column_stack([table["x"], table["y"]])
     found = points[[0, -1]]
-    if len(held) and len(points) > 1:
+    if len(constrained) and len(points) > 1:
         for k, (last, before) in enumerate([(0, 1), (-1, -2)]):
-            distance = np.linalg.norm(held - points[last], axis=1)
+            distance = np.linalg.norm(constrained - points[last], axis=1)
             if distance.min() < 1.5 * np.linalg.norm(points[last] - points[before]):
-                found[k] = held[np.argmin(distance)]
+                found[k] = constrained[np.argmin(distance)]
     return found
 
 

@@ -140,7 +140,7 @@ def profiles(run: Run, scale: float, places: Array, box: Array | None) -> list[P
         if gap.min() > np.ptp(places @ across) > 0:  # the body would be a dot beside it
             continue
         # Held nodes beside the first and the last have their distances.
-        first, last = ends(table, run.held)
+        first, last = ends(table, run.constrained)
         points = np.concatenate([first[None], points, last[None]])
         normal, drawn, gap = (np.concatenate([v[:1], v, v[-1:]]) for v in (normal, drawn, gap))
         found.append(Profile(points + drawn[:, None] * normal, normal, gap))

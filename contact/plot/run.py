@@ -71,7 +71,7 @@ class Run:
         return [{k: v[owner == i] for k, v in self.table.items()} for i in np.unique(owner)]
 
     @property
-    def held(self) -> Array:
+    def constrained(self) -> Array:
         """Nodes of the contact part that are no contact nodes, shape (n, d)."""
         return np.asarray(self.surface.points[self.surface["row"] < 0, : len(self.axes)])
 

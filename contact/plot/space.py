@@ -473,7 +473,7 @@ def _show_status(ax: Axes, front: Any, camera: Camera) -> None:
     mesh = polygons(quads.reshape(-1, 4, 3))
     order = np.argsort([STATUS[zone] for zone in ZONES])
     status = front["status"][front.regular_faces].ravel().astype(int)
-    known = status >= STATUS["open"]  # nodes that are held are no contact nodes
+    known = status >= STATUS["open"]  # nodes that are constrained are no contact nodes
     mesh.cell_data["zone"] = np.where(known, order[np.maximum(status, 0)], len(ZONES))
     listed = ListedColormap([*(colour for colour, _ in ZONES.values()), UNKNOWN])
     _shown(ax, camera, mesh, scalars="zone", cmap=listed, clim=[-0.5, len(ZONES) + 0.5])

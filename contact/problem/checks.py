@@ -268,7 +268,7 @@ def _unconstrained(group: Group, unconstrained: Array) -> str:
         motions = linalg.orth(np.concatenate(group.of_components(unconstrained)))
     modes = mode_names(motions, group.names[: len(motions)])
     return (
-        f"the body{about} is not held: it can move as a rigid body ({modes}); accepted: "
+        f"the body{about} is not constrained: it can move as a rigid body ({modes}); accepted: "
         "displacement components fixed so that it cannot"
     )
 
@@ -299,11 +299,11 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     rows = [np.hstack([raised[:, -1], -follows])[~body.free[:, -1]]]
     columns = linalg.block_diag(raised.reshape(body.owned, count), electrodes)
     locally = [body.local(column) for column in columns.T]
-    flows, among_held = _flows(problem, state)
+    flows, among_fixed = _flows(problem, state)
     rows.append(np.column_stack([problem.nodes.jump(x)[flows, -1] for x in locally]))
     if interface.fixed_conducting is not None:
         nodes = interface.fixed_conducting.nodes
-        rows.append(np.column_stack([nodes.jump(x)[among_held, -1] for x in locally]))
+        rows.append(np.column_stack([nodes.jump(x)[among_fixed, -1] for x in locally]))
     gram = sum(problem.comm.allreduce(part.T @ part, op=MPI.SUM) for part in rows)
     floating = null_space(gram / max(np.trace(gram), 1.0))
     if floating.shape[1] == 0:
@@ -326,14 +326,14 @@ def _flows(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which contact nodes, and which fixed ones, carry charge, or could without a state."""
     interface = problem.interface
-    law, held = interface.foundation, interface.fixed_conducting
+    law, constrained = interface.foundation, interface.fixed_conducting
     if state is None:
-        return _conducts(law, interface.size), _conducts(held, interface.size)
+        return _conducts(law, interface.size), _conducts(constrained, interface.size)
     charged = [
         law.charge_block(jump, pressure, full=True)[:, -1, -1] != 0
         for law, jump, pressure in interface.acting(state.x, state.multipliers)
     ]
-    return charged[0], charged[1] if held is not None else np.zeros(0, dtype=bool)
+    return charged[0], charged[1] if constrained is not None else np.zeros(0, dtype=bool)
 
 
 def _conducts(law: FoundationLaw | None, deep: float) -> NDArray[np.bool_]:

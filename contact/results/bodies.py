@@ -258,9 +258,9 @@ def _least_constrained(
     resisting = np.concatenate([(normal * touches[:, None])[:, None, :], resisted], axis=1)
     product = "n,nik,nil->kl"
     sums = np.array([np.einsum(product, nodes.weight, part, part) for part in (resisting, whole)])
-    held, moved = nodes.comm.allreduce(sums, op=MPI.SUM)
+    resisted_sum, moved = nodes.comm.allreduce(sums, op=MPI.SUM)
     area = nodes.sum(np.ones_like(nodes.weight))
-    values, motions = linalg.eigh(held / area, moved / area)
+    values, motions = linalg.eigh(resisted_sum / area, moved / area)
     return np.maximum(values, 0.0), free @ motions
 
 

@@ -121,7 +121,7 @@ class ContactResult:
     def function(self, name: str) -> fem.Function:
         """Return one of the arrays as a function on a mesh of the contact surface. Collective.
 
-        It is NaN at nodes that are held, and hence no contact nodes.
+        It is NaN at nodes that are constrained, and hence no contact nodes.
 
         Raises
         ------

@@ -462,17 +462,17 @@ def _unknown(problem: ContactProblem, index: int, i: int, turns: bool = False) -
 
 def _on_support(problem: ContactProblem, part: str, axis: int) -> Array:
     """Return the weights of a support's reaction. Collective."""
-    nodes, held = holding(problem, electric=False)[part]
+    nodes, matrices = holding(problem, electric=False)[part]
     weights = _no_weights(problem)
-    problem.body.nodal(weights)[nodes, : problem.dim] = _share(problem, axis) * held[:, axis]
+    problem.body.nodal(weights)[nodes, : problem.dim] = _share(problem, axis) * matrices[:, axis]
     return weights
 
 
 def _on_electrode(problem: ContactProblem, part: str) -> Array:
     """Return the weights of the charge of a prescribed potential. Collective."""
-    nodes, held = holding(problem, electric=True)[part]
+    nodes, matrices = holding(problem, electric=True)[part]
     body, weights = problem.body, _no_weights(problem)
-    body.nodal(weights)[nodes, -1] = held[:, 0, 0] / body.phi_scale
+    body.nodal(weights)[nodes, -1] = matrices[:, 0, 0] / body.phi_scale
     return weights
 
 

@@ -103,7 +103,7 @@ class LocalProblems:
         #: The nodes of each facet, as nodes of its cell.
         self._closures = shape.facet_nodes(2)
         self._loads, self._load_points = _loads(body, state.time)
-        self._through, self._held, unknown = self._facets(problem, state)
+        self._through, self._constrained, unknown = self._facets(problem, state)
         self._through += balancing(body, self._out_of_balance(), unknown)
 
     def _out_of_balance(self) -> Array:
@@ -145,8 +145,8 @@ class LocalProblems:
         """Return the flux into each cell through its facets, and two flags of its components."""
         # Inside it is the mean of both sides. On the boundary it is among the loads, where these
         # are known; at a contact that touches, that of the multipliers, and the flux itself where
-        # there are none: of charge, on the other side. Which components are held, without any
-        # error, and of which the flux is unknown.
+        # there are none: of charge, on the other side. The flags are those of components that are
+        # constrained, without any error, and of those whose flux is unknown.
         body, d = self._body, self._body.dim
         sides, out = Sides(body, self._closures), self._normal_flux()
         facets, nodes, inside = sides.facets, sides.nodes, sides.inside
@@ -178,16 +178,16 @@ class LocalProblems:
         parts = [body.domain.facets_anywhere(name) for name in names]
         boundary = ~inside[..., None]
         split = boundary | np.isin(facets, np.concatenate([[], *parts]))[..., None]
-        held = split & (free == 0)
-        unknown = held | (boundary & touch[..., None])
+        constrained = split & (free == 0)
+        unknown = constrained | (boundary & touch[..., None])
         one_sided = (unknown | boundary)[:, :, None]
         mean = np.where(one_sided, out, out - sides.sums(out) / 2)
         through = np.where((unknown | ~boundary)[:, :, None], mean, 0.0)
         traction = _contact_traction(problem, state)[nodes]
         pressed = (touch & slave)[..., None, None] & np.isfinite(traction)
         through[..., :d] = np.where(pressed, traction, through[..., :d])
-        held = held | (boundary & (touch & loaded & ~slave)[..., None])
-        return through, held, unknown
+        constrained = constrained | (boundary & (touch & loaded & ~slave)[..., None])
+        return through, constrained, unknown
 
     def squares(self, cells: Indices, moduli: Array) -> Array:
         """Return squares of the energy norm of errors; moduli (cells, 6 or 9, 6 or 9), or one."""
@@ -204,14 +204,14 @@ class LocalProblems:
         moduli = moduli[..., self._kept, :][..., self._kept]
         fluxes = (moduli[:, None] @ work.strains).reshape(work.weighted.shape)
         matrix = work.weighted.swapaxes(1, 2) @ fluxes
-        right, held = self._residual(cells, CUBICS, work)
+        right, constrained = self._residual(cells, CUBICS, work)
         if body.piezoelectric:
-            held[..., body.dim] |= (moduli[:, -1, -1] == 0)[:, None]
-        held, right = held.reshape(count, -1), right.reshape(count, -1)
-        right[held] = 0.0
-        matrix[held[:, :, None] | held[:, None, :]] = 0.0
-        places = np.arange(held.shape[1])
-        matrix[:, places, places] += held
+            constrained[..., body.dim] |= (moduli[:, -1, -1] == 0)[:, None]
+        constrained, right = constrained.reshape(count, -1), right.reshape(count, -1)
+        right[constrained] = 0.0
+        matrix[constrained[:, :, None] | constrained[:, None, :]] = 0.0
+        places = np.arange(constrained.shape[1])
+        matrix[:, places, places] += constrained
         errors = np.linalg.solve(matrix, right[..., None])[..., 0]
         return np.asarray(np.sum(errors * right, axis=1))
 
@@ -255,14 +255,14 @@ class LocalProblems:
     def _residual(
         self, cells: Indices, basis: Basis, work: Work
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the residuals of functions in cells, (cells, n, b), and which are held."""
+        """Return the residuals of functions in cells, (cells, n, b), and which are constrained."""
         body, shape, of, count = self._body, self._shape, self._nodes[cells], len(cells)
         flux = shape.lagrange(2, work.at) @ self._flux[cells]
         known = flux[..., self._kept].reshape(count, -1, 1)
         inner = (work.weighted.swapaxes(1, 2) @ known)[..., 0]
         right = basis.values(shape, self._load_points).T @ self._loads[cells]
         right = right - inner.reshape(right.shape)
-        held = np.zeros(right.shape, dtype=bool)
+        constrained = np.zeros(right.shape, dtype=bool)
         at, weights = rule(shape.facet, 5)
         for facet, ends in enumerate(shape.facet_nodes(body.domain.order)):
             values = basis.values(shape, shape.on_facet(facet, at))
@@ -270,8 +270,8 @@ class LocalProblems:
             flux = shape.facet.lagrange(2, at) @ self._through[cells, facet]
             right += values.T @ (areas[..., None] * flux)
             acts = np.abs(values).max(axis=0) > ROUNDING
-            held |= acts[None, :, None] & self._held[cells, facet][:, None]
-        return right, held
+            constrained |= acts[None, :, None] & self._constrained[cells, facet][:, None]
+        return right, constrained
 
 
 def _contact_traction(problem: ContactProblem, state: State) -> Array:

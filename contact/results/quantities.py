@@ -53,7 +53,7 @@ def _node_counts(record: Any) -> str:
     return "/".join(map(str, record.sizes or ()))
 
 
-#: Of the contact nodes; fields of the contact part are NaN, or -1, at nodes that are held.
+#: Of the contact nodes; fields of the contact part are NaN, or -1, at nodes that are constrained.
 AT_NODES = (
     Quantity(
         "on", "", "Part of the node; where there are several contacts.", lambda n: n.part, (NODES,),
@@ -111,7 +111,7 @@ AT_NODES = (
     Quantity("normal", "", "Contact direction ν, out of the body.", files=(SURFACE,)),
     Quantity("charge", "charge/area", "As `d_n`; of piezoelectric bodies.", files=(SURFACE,)),
     Quantity(
-        "status", "", "0 open, 1 stick, 2 slip; -1 for a node that is held.",
+        "status", "", "0 open, 1 stick, 2 slip; -1 for a node that is constrained.",
         lambda n: np.array([STATUS[name] for name in n.status], np.int32), (SURFACE,),
     ),
     Quantity(
@@ -276,8 +276,8 @@ def _reaction_columns(given: Any) -> dict[str, float]:
     """Return the reactions of supports by columns, ``reaction_x_left``."""
     return {
         f"reaction_{axis}_{part}": float(value)
-        for part, held in given.supports.items()
-        for axis, value in zip("xyz", held.force, strict=False)
+        for part, support in given.supports.items()
+        for axis, value in zip("xyz", support.force, strict=False)
     }
 
 
@@ -386,7 +386,7 @@ _RUN = (
         "A node of two parts counts for the first of them in the case. Their sum plus the loads, "
         "and the forces of `rigid_parts`, minus `contact_force` is zero, if forces between bodies "
         "are left out of the latter.",
-        lambda r: {part: held.force for part, held in r.supports.items()}, component=VECTOR,
+        lambda r: {part: support.force for part, support in r.supports.items()}, component=VECTOR,
     ),
     Quantity(
         "reaction_AXIS_PART", "force", "Force of each support: `reaction_x_left`, ...",
@@ -394,7 +394,7 @@ _RUN = (
     ),
     Quantity(
         "reaction_moments", "force · length", "Moments of the reactions, as `contact_moment`.",
-        lambda r: {part: held.moment for part, held in r.supports.items()}, component=VECTOR,
+        lambda r: {part: support.moment for part, support in r.supports.items()}, component=VECTOR,
     ),
     Quantity(
         "region", "", "Place of the cell's region among `regions` of the summary, from 0; of "

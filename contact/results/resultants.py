@@ -64,8 +64,8 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
     residual = body.nodal(residual_forces(problem, state))[:, :d]
     points = body.space.tabulate_dof_coordinates()[:, :d]
     found = {
-        part: resultant(problem, points[nodes], np.einsum("nij,nj->ni", held, residual[nodes]))
-        for part, (nodes, held) in holding(problem, electric=False).items()
+        part: resultant(problem, points[nodes], np.einsum("nij,nj->ni", matrices, residual[nodes]))
+        for part, (nodes, matrices) in holding(problem, electric=False).items()
     }
     owned = body.owned // body.block_size
     forces_of = body.elastic_forces(state.x)
@@ -87,19 +87,19 @@ def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[
     found: dict[str, tuple[NDArray[np.int32], Array]] = {}
     left = ~body.unsupported[:, slice(d, None) if electric else slice(d)]
     for number, fixed in enumerate(problem.description.fixed):
-        held = np.isin(np.arange(d), [*fixed.components])
+        constrained = np.isin(np.arange(d), [*fixed.components])
         if electric:
-            held = np.array([fixed.potential is not None])
+            constrained = np.array([fixed.potential is not None])
         rolls = fixed.normal is not None and not electric
-        for part in members(fixed.on) if held.any() or rolls else ():
+        for part in members(fixed.on) if constrained.any() or rolls else ():
             nodes = nodes_of(problem, part)
             if rolls:
                 along = body.rollers.forces(number, nodes)
             else:
-                along = np.eye(held.size) * (left[nodes] & held)[:, None, :]
+                along = np.eye(constrained.size) * (left[nodes] & constrained)[:, None, :]
                 if not electric:
                     along = along - along @ body.rollers.borne(nodes)
-                left[nodes] &= ~held
+                left[nodes] &= ~constrained
             if part in found:  # prescribed there by several entries
                 along = along + found[part][1]
             found[part] = nodes, along
@@ -119,7 +119,7 @@ class DrivenPart:
     """The part that is moved or loaded in time: its way and its force make a loop."""
 
     #: Where residuals are reactions of its supports, and the matrices of these; `holding`.
-    held: Sequence[tuple[NDArray[np.int32], Array]]
+    supports: Sequence[tuple[NDArray[np.int32], Array]]
     loads: Loads  #: those on the part alone
 
     @staticmethod
@@ -129,18 +129,18 @@ class DrivenPart:
         if on is None:
             return None
         parts, body = set(members(on)), problem.body
-        held = [at for part, at in holding(problem, electric=False).items() if part in parts]
+        supports = [at for part, at in holding(problem, electric=False).items() if part in parts]
         within = [load.on for load in problem.description.loads if load.on]
         within = [name for name in within if parts >= set(members(name))]
-        return DrivenPart(held, body.loads_along(body.space, within))
+        return DrivenPart(supports, body.loads_along(body.space, within))
 
     def force(self, problem: ContactProblem, state: State) -> Array:
         """Return the force on it, of its own supports and loads, shape (d,). Collective."""
         d, body = problem.dim, problem.body
         residual = body.nodal(residual_forces(problem, state))[:, :d]
         total = self.loads.at(state.time).reshape(-1, body.block_size)[:, :d].sum(axis=0)
-        for nodes, held in self.held:
-            total = total + np.einsum("nij,nj->i", held, residual[nodes])
+        for nodes, matrices in self.supports:
+            total = total + np.einsum("nij,nj->i", matrices, residual[nodes])
         return np.asarray(problem.comm.allreduce(total, op=MPI.SUM))
 
 
@@ -198,7 +198,7 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     residual = body.nodal(residual_forces(problem, state))[:, d:]
     residual = np.asarray(residual / body.phi_scale)
     parts = holding(problem, electric=True)
-    on_parts = {part: held[:, 0] * residual[nodes] for part, (nodes, held) in parts.items()}
+    on_parts = {part: matrices[:, 0] * residual[nodes] for part, (nodes, matrices) in parts.items()}
     on_parts |= {e.on: residual[nodes_of(problem, e.on)] for e in problem.description.electrodes}
     electrodes = {part: _sum(problem, charges) for part, charges in on_parts.items()}
     magnitude = sum(_sum(problem, np.abs(charges)) for charges in on_parts.values())

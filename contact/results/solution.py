@@ -379,7 +379,7 @@ class Results:
         if part not in self.supports:
             raise InputError(
                 f"reaction({part!r}): no displacement is prescribed there; accepted: "
-                f"{', '.join(self.supports) or 'none, for nothing is held'}",
+                f"{', '.join(self.supports) or 'none, for nothing is constrained'}",
                 "no-such-name",
             )
         return self.supports[part].force

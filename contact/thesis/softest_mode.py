@@ -111,5 +111,5 @@ def softest_mode(problem: ContactProblem, operator: Operator, state: State, shif
     compliance = inner(basis, images)
     values = np.linalg.eigvalsh((compliance + compliance.T) / 2)
     stiffness = 1 / values[values > 0] - shift
-    held = stiffness[stiffness > FREE * shift]
-    return float(held.min(initial=np.inf))
+    constrained = stiffness[stiffness > FREE * shift]
+    return float(constrained.min(initial=np.inf))

@@ -86,7 +86,7 @@ def ranks(report: Report) -> None:
 
 def memory(report: Report) -> None:
     """Memory of ranks."""
-    held = []
+    rows = []
     for dimension, n in ((2, 32), (3, 8)) if report.coarse else ((2, 128), (3, 20)):
         first, least = np.nan, np.nan
         for count in (1, 2, 4):
@@ -96,7 +96,7 @@ def memory(report: Report) -> None:
             )
             size, of_library = found["bytes an unknown"], alone["bytes an unknown"]
             first, least = (size, of_library) if count == 1 else (first, least)
-            held.append(
+            rows.append(
                 {
                     "dimension": dimension,
                     "unknowns": found["unknowns"],
@@ -110,7 +110,7 @@ def memory(report: Report) -> None:
     report.table(
         "bench-memory",
         "Memory of all ranks together",
-        held,
+        rows,
         "Peaks of the whole run beyond the memory of the loaded libraries, and those of one "
         "linear solve by dolfinx and PETSc alone.",
     )

@@ -23,7 +23,7 @@ from mpi4py import MPI
 from contact.mesh.grid import box
 
 #: Regions of the boundary.
-HELD, CONTACT, LOADED = 1, 2, 3
+CONSTRAINED, CONTACT, LOADED = 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class Setting:
 
     mesh: gf.Mesh
     young: float
-    #: Diagonal of the matrix that picks the components held on HELD.
-    held: tuple[float, ...]
+    #: Diagonal of the matrix that picks the components constrained on CONSTRAINED.
+    constrained: tuple[float, ...]
     #: On LOADED.
     traction: tuple[float, ...]
 
@@ -64,7 +64,7 @@ def bar(cells: str) -> Setting:
     mesh = gf.Mesh("empty", 2)
     mesh.add_convex(gf.GeoTrans("GT_PK(2,1)"), triangles(int(cells)))
     faces, normals, middles = outer_faces(mesh)
-    mesh.set_region(HELD, faces[:, normals[0] < -0.5])
+    mesh.set_region(CONSTRAINED, faces[:, normals[0] < -0.5])
     mesh.set_region(CONTACT, faces[:, normals[1] < -0.5])
     mesh.set_region(LOADED, faces[:, (normals[1] > 0.5) & (middles[0] > 2.0)])
     return Setting(mesh, 1.0, (1.0, 1.0), (0.0, -0.005))
@@ -76,7 +76,7 @@ def hertz(path: str) -> Setting:
     mesh.set("optimize structure")
     faces, _, middles = outer_faces(mesh)
     symmetry, top = middles[0] < 1e-9, middles[1] > 8 - 1e-9
-    mesh.set_region(HELD, faces[:, symmetry])
+    mesh.set_region(CONSTRAINED, faces[:, symmetry])
     mesh.set_region(CONTACT, faces[:, ~symmetry & ~top])
     mesh.set_region(LOADED, faces[:, top])
     return Setting(mesh, 2000.0, (1.0, 0.0), (0.0, -100.0))
@@ -91,7 +91,7 @@ def block(cells: str) -> Setting:
         gf.GeoTrans("GT_PK(3,1)"), np.moveaxis(ours.x[ours.dofmap], 2, 0).swapaxes(1, 2)
     )
     faces, normals, _ = outer_faces(mesh)
-    mesh.set_region(HELD, faces[:, normals[0] < -0.5])
+    mesh.set_region(CONSTRAINED, faces[:, normals[0] < -0.5])
     mesh.set_region(CONTACT, faces[:, normals[2] < -0.5])
     mesh.set_region(LOADED, faces[:, normals[2] > 0.5])
     return Setting(mesh, 1.0, (1.0, 1.0, 1.0), (0.0, 0.005, -0.02))
@@ -109,13 +109,13 @@ def model(setting: Setting, mu: float) -> tuple[gf.Model, tuple[object, ...]]:
     made.add_initialized_data("lame", [young * poisson / ((1 + poisson) * (1 - 2 * poisson))])
     made.add_initialized_data("shear", [young / (2 + 2 * poisson)])
     made.add_isotropic_linearized_elasticity_brick(rule, "u", "lame", "shear")
-    if all(setting.held):
-        made.add_Dirichlet_condition_with_simplification("u", HELD)
+    if all(setting.constrained):
+        made.add_Dirichlet_condition_with_simplification("u", CONSTRAINED)
     else:
         made.add_initialized_data("zero", [0.0, 0.0])
-        made.add_initialized_data("held", np.diag(setting.held))
+        made.add_initialized_data("constrained", np.diag(setting.constrained))
         made.add_generalized_Dirichlet_condition_with_multipliers(
-            rule, "u", u, HELD, "zero", "held"
+            rule, "u", u, CONSTRAINED, "zero", "constrained"
         )
     made.add_initialized_data("load", list(setting.traction))
     made.add_source_term_brick(rule, "u", "load", LOADED)

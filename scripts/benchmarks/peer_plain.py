@@ -73,7 +73,7 @@ class Plain:
         residual -= self.load * v[1] * domain.ds("loaded")
         residual += (friction * v[0] - pressure * v[1]) * domain.ds("bottom")
         dofs = fem.locate_dofs_geometrical(space, lambda x: x[0] < 1e-9)
-        self._held = np.add.outer(2 * dofs, [0, 1]).ravel()
+        self._constrained = np.add.outer(2 * dofs, [0, 1]).ravel()
         self._conditions = [fem.dirichletbc(np.zeros(2), dofs, space)]
         self._residual, self._left = fem.form(residual), fem.Function(space)
         self._tangent = fem.form(ufl.derivative(residual, u))
@@ -127,7 +127,7 @@ class Plain:
         left = self._left.x.array
         left[:] = 0.0
         fem.assemble_vector(left, self._residual)
-        left[self._held] = 0.0
+        left[self._constrained] = 0.0
         return float(np.linalg.norm(left))
 
 

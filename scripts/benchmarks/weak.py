@@ -142,7 +142,7 @@ def problem_of(comm: MPI.Intracomm, n: int, bodies: int, length: int = 0) -> Con
     return ContactProblem(domain, Body(Linear(1.0, 0.3), fixed), contact)
 
 
-def held(problem: ContactProblem) -> int:
+def coupling_bytes(problem: ContactProblem) -> int:
     """Return the bytes of the coupling on this rank."""
     found = 0
     for geometry in problem.geometries:
@@ -189,7 +189,7 @@ def measure(comm: MPI.Intracomm, n: int, bodies: int) -> dict[str, Any]:
         "unknowns": problem.body.layout.unknowns,
         "contact nodes": problem.nodes.size,
         "python": comm.allreduce(peak, op=MPI.MAX),
-        "coupling": comm.allreduce(held(problem), op=MPI.MAX),
+        "coupling": comm.allreduce(coupling_bytes(problem), op=MPI.MAX),
         "received": comm.allreduce(received, op=MPI.SUM),
         **stages,
     }
@@ -220,7 +220,7 @@ def timed(comm: MPI.Intracomm, n: int, bodies: int, length: int) -> dict[str, An
         "ranks": comm.size,
         "unknowns": problem.body.layout.unknowns,
         "contact nodes": problem.nodes.size,
-        "coupling": comm.allreduce(held(problem), op=MPI.MAX),
+        "coupling": comm.allreduce(coupling_bytes(problem), op=MPI.MAX),
         "converged": solution.converged,
         "forces": [*map(float, np.ravel(solution.contact_force))],
         "iterations": counters.linear_iterations,

@@ -56,8 +56,8 @@ plt.show()
 # %%
 np.testing.assert_allclose(solution.reaction("top"), solution.contact_force, rtol=1e-7)
 
-held = [Fixed("top", ["free", -0.005]), Fixed("left", [0.0, "free"])]
-smooth = solve(Problem(domain, Body(rubber, held), Contact("bottom")))
+supports = [Fixed("top", ["free", -0.005]), Fixed("left", [0.0, "free"])]
+smooth = solve(Problem(domain, Body(rubber, supports), Contact("bottom")))
 by_hand = 2.0 * 10.0 / (1 - 0.3**2) * 0.005
 print(-smooth.contact_force[1], by_hand)
 assert np.isclose(-smooth.contact_force[1], by_hand, rtol=1e-8)

@@ -72,10 +72,10 @@ print({name: len(domain.facets(name)) for name in domain.parts}, "facets")
 # %%
 steel = Linear(210e3, 0.3)
 area = np.pi * (7**2 - 3.5**2)
-held = [Fixed("washer", [0.0, 0.0, "free"])]
+supports = [Fixed("washer", [0.0, 0.0, "free"])]
 loads = [Load("washer", traction=[0, 0, -5000 / area]), Load("tip", traction=[-5.0, 0, 0])]
 table = Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-problem = Problem(domain, Body(steel, held, loads), Contact("bottom", table), Friction(mu=0.2))
+problem = Problem(domain, Body(steel, supports, loads), Contact("bottom", table), Friction(mu=0.2))
 solution = solve(problem)
 print(solution.outcome.reason)
 contact = solution.contact

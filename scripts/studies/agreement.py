@@ -212,7 +212,7 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
                 *branches.size(found),
                 branches.difference(found, first).largest,
                 evaluate(branches.problem, found.state).largest,
-                *held(one, found),
+                *restarted(one, found),
             )
     if columns["example"]:
         report.table(
@@ -235,7 +235,7 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
         )
 
 
-def held(one: Compared, found: Solution) -> tuple[object, ...]:
+def restarted(one: Compared, found: Solution) -> tuple[object, ...]:
     """Return the ends of both methods from a solution and from a start beside it. Collective."""
     branches = one.branches
     stays, back = [], []

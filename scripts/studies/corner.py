@@ -18,7 +18,7 @@ POISSON, RHO = 0.3, 1e4
 
 
 def exponent(poisson: float, angle: float = np.pi / 2) -> float:
-    """Return lambda of u ~ r^lambda in a corner with one side held and one free, plane strain.
+    """Return lambda of u ~ r^lambda in a corner of a constrained and a free side, plane strain.
 
     The least root of sin(lambda omega)^2 = ((kappa + 1)^2 - 4 lambda^2 sin(omega)^2) / (4 kappa),
     kappa = 3 - 4 nu (Williams, J. Appl. Mech. 19 (1952) 526).

@@ -97,7 +97,7 @@ class Profile:
     contact: Sequence[int]
     #: Those that are displaced; the others have no traction along them, nor a normal motion that is
     #: not the given one.
-    held: Sequence[int]
+    constrained: Sequence[int]
     #: Returns the shape that conforms to them, in a dimension of space, as large as given.
     shape: Callable[[int, float], Shape]
 
@@ -230,7 +230,7 @@ def _write(profiles: Sequence[Profile], h: float, dim: int, path: str, order: in
                 solid, tags = face, [[side] for side in sides]
             model.synchronize()
             body.append(solid)
-            groups = {"contact": profile.contact, "held": profile.held}
+            groups = {"contact": profile.contact, "constrained": profile.constrained}
             groups |= {f"side{k}": [k] for k in range(len(sides))}
             for name, of in groups.items():
                 parts[name + behind] = [tag for k in of for tag in tags[k]]
@@ -294,11 +294,11 @@ def hydrostatic(name: str, h: float, degree: int, kind: str, order: int = 1) -> 
     given: list[Any] = [
         lambda x, i=i: -ALPHA * (x[i] - (CENTRE[1] if i == dim - 1 else 0.0)) for i in range(dim)
     ]
-    fixed = [Fixed("held", given)]
+    fixed = [Fixed("constrained", given)]
     corners = np.array(profile.points)
     for k in range(len(corners)):
         a, b = corners[k], corners[(k + 1) % len(corners)]
-        rest = k not in (*profile.contact, *profile.held)
+        rest = k not in (*profile.contact, *profile.constrained)
         if rest and a[1] == b[1]:
             fixed.append(Fixed(f"side{k}", [*[None] * (dim - 1), given[-1]]))
         if rest and dim == 2 and a[0] == b[0] == 0:
@@ -338,7 +338,7 @@ def ring(
     else:
         a, b = np.linalg.solve([[outer, 1 / outer], inside], [0.0, -1.0])
         exact, shape = -outside @ [a, b], Sphere(centre=(0.0, 0.0), radius=outer, inside=True)
-        on, loads = "held", [Load("contact", pressure=1.0)]
+        on, loads = "constrained", [Load("contact", pressure=1.0)]
     sides = [Fixed("side0", [None, 0.0]), Fixed("side2", [0.0, None])]
     body = Body(Linear(YOUNG, POISSON), sides, loads)
     contact = Contact(on, shape, press=True)
@@ -356,7 +356,7 @@ def two_rings(h: float, degree: int, overlap: float = 0.001) -> tuple[Solution, 
     sides = [Fixed(f"side0{k}", [None, 0.0]) for k in ("", "1")]
     sides += [Fixed(f"side2{k}", [0.0, None]) for k in ("", "1")]
     body = Body(Linear(YOUNG, POISSON), sides)
-    pair = Contact("held", against="contact1", press=True)
+    pair = Contact("constrained", against="contact1", press=True)
     solution = solve(Problem(domain, body, pair, degree=degree))
     # Compliances of both sides: u_r of a pressure of 1 there.
     factor = np.array([1 / (1 - 2 * POISSON), -1.0]) * YOUNG / (1 + POISSON)

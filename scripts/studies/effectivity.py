@@ -148,8 +148,8 @@ def beside() -> dict[str, tuple[Callable[[int, int], ContactProblem], list[Any],
 def block(n: int, degree: int) -> ContactProblem:
     """Return a block 2 x 1 x 1 that is clamped at one end and sheared at the other. Collective."""
     domain = box(MPI.COMM_WORLD, [0.0] * 3, [2.0, 1.0, 1.0], [2 * n, n, n])
-    held, load = Fixed("left", [0.0] * 3), Load("right", [0.0, 0.0, -1e-3])
-    body = Body(Linear(1.0, 0.3), [held], [load])
+    support, load = Fixed("left", [0.0] * 3), Load("right", [0.0, 0.0, -1e-3])
+    body = Body(Linear(1.0, 0.3), [support], [load])
     return ContactProblem(domain, body, Contact("bottom", flat(10.0)), degree=degree)
 
 

@@ -138,13 +138,13 @@ def sphere(
     }
     radius, angle = grid.geometry.x[:, :2].T.copy()
     grid.geometry.x[:, :2] = (radius * [np.cos(angle), np.sin(angle)]).T
-    held, loads = [Fixed("base", [None, 0.0])], []
+    supports, loads = [Fixed("base", [None, 0.0])], []
     if pressure is not None:
         loads.append(Load("inner", pressure=1.0, amplitude=pressure))
     if displacement is not None:
         radial = [lambda x, i=i: x[i] / np.hypot(x[0], x[1]) for i in range(2)]
-        held.append(Fixed("inner", radial, amplitude=displacement))
-    body = Body(J2(young, POISSON, yield_stress=limit), held, loads)
+        supports.append(Fixed("inner", radial, amplitude=displacement))
+    body = Body(J2(young, POISSON, yield_stress=limit), supports, loads)
     domain = revolved(from_mesh(grid, parts))
     return Problem(domain, body, Contact("outer", FAR), degree=degree, element=element)
 

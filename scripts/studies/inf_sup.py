@@ -58,7 +58,7 @@ class Mesh:
     make: Callable[[int], Domain]
     #: Its Gamma_3.
     part: str
-    #: The parts that are held.
+    #: The parts that are constrained.
     fixed: Sequence[str]
 
     def problem(self, domain: Domain, degree: int) -> ContactProblem:

@@ -234,7 +234,7 @@ def turn_of_cylinders(elements: float, steps: int, degree: int = 1) -> float:
 def draw(report: Report, loop: Loop) -> None:
     """Draw a loop over the closed form."""
     end = loop.share * MU * loop.normal
-    # Half balls yield where they are held too, in proportion to the force.
+    # Half balls yield where they are constrained too, in proportion to the force.
     signs = np.sign(np.diff(loop.way, prepend=loop.way[0] + 1))
     exact = np.where(signs < 0, loop.curve(-loop.force, 1.0) * -1, loop.curve(loop.force, 1.0))
     share = float(loop.force @ (loop.way - exact) / (loop.force @ loop.force))

@@ -148,9 +148,9 @@ def summit(table: Table, a: float) -> float:
 def approach(small: Pressed, large: Pressed, kinematics: str) -> float:
     """Return the approach of two bodies over Hertz's, without the deformation far from the contact.
 
-    Hertz's is that of half spaces; bodies of finite size move too where they are held. For balls
-    that share is proportional to the force, against force^(2/3): two forces tell both apart. Two
-    half planes have no approach but by its change with the half width, -2/(pi E*) log a a unit
+    Hertz's is that of half spaces; bodies of finite size move too where they are constrained. For
+    balls that share is proportional to the force, against force^(2/3): two forces tell both apart.
+    Two half planes have no approach but by its change with the half width, -2/(pi E*) log a a unit
     force.
     """
     if kinematics == "axisymmetric":

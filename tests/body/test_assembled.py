@@ -37,10 +37,12 @@ def problems():
     solid = leaning_block(MPI.COMM_SELF, 1, 2)
     yield "norm in space P2", solid
     floating = pressed_block(MPI.COMM_SELF, 3, 1)
-    held = Body(LAWS["norm"], [Fixed("left", [Affine((0.0,) * 3)] * 3)])
+    supported = Body(LAWS["norm"], [Fixed("left", [Affine((0.0,) * 3)] * 3)])
     yield (
         "norm in space P1",
-        ContactProblem(floating.domain, held, Contact("bottom", floating.contacts[0].foundation)),
+        ContactProblem(
+            floating.domain, supported, Contact("bottom", floating.contacts[0].foundation)
+        ),
     )
 
 

@@ -280,7 +280,7 @@ def wedge(order, values=(0.0, 0.0), more=()):
 
 @pytest.mark.parallel
 def test_forces_of_rollers_that_share_nodes_are_along_their_normals_in_any_order():
-    """The corner is held by two normals that are not orthogonal; a fixed component is no other."""
+    """The corner is constrained by two normals that are not orthogonal; a fixed one is no other."""
     found = []
     for order in (["left", "bottom"], ["bottom", "left"]):
         domain, body = wedge(order)

@@ -54,7 +54,7 @@ WRONG = {
     "a body that can slide": (
         BAR[BAR.index("[0.0, 0.0]") :],
         '["free", 0.0]\n[contact]\non = "bottom"\n',
-        "not held",
+        "not constrained",
     ),
     "an indefinite permittivity": (
         "[[load]]",

@@ -143,9 +143,9 @@ def test_columns_of_the_summary(sweep):
 
 def test_a_row_that_is_refused_is_named(sweep, capsys):
     """The rows before it are kept."""
-    held = ("--set", "fixed.0.displacement=[0.0, 'free']", "--set", "friction.mu=0.0")
+    supports = ("--set", "fixed.0.displacement=[0.0, 'free']", "--set", "friction.mu=0.0")
     over = ("--over", "load.0.traction=[0.0, -0.01],[0.0, 0.01]")
-    status, rows = sweep(*held, *over)
+    status, rows = sweep(*supports, *over)
     assert (status, len(rows)) == (2, 1)
     said = capsys.readouterr().err
     assert said.startswith("contact: load.0.traction=[0.0, 0.01]: ")

@@ -29,10 +29,10 @@ def turned(dim):
             MPI.COMM_SELF, [0] * 3, [1] * 3, [3, 2, 1], rotation=25.0, axis=(1.0, 2.0, 0.5)
         )
     body = example.description
-    held = type(body)(body.law, [type(body.fixed[0])("top", body.fixed[0].displacement)])
+    supported = type(body)(body.law, [type(body.fixed[0])("top", body.fixed[0].displacement)])
     friction = Friction(ConstantCoefficient(0.4))
     gap = GapFunction(lambda points: 0.02 * np.sin(5 * points[:, 0]))
-    return ContactProblem(domain, held, Contact("bottom", gap, press=True), friction)
+    return ContactProblem(domain, supported, Contact("bottom", gap, press=True), friction)
 
 
 @pytest.fixture(scope="module", params=[2, 3], ids=["in the plane", "in space"])

@@ -143,16 +143,16 @@ def test_nodes_that_cannot_reach_the_foundation_are_left_out():
 
 
 @pytest.mark.parametrize(
-    ("radius", "held", "words"),
+    ("radius", "fixed_part", "words"),
     [(0.2, "top", r"\[tip-on-axis\]"), (0.6, "bottom", r"\[held-part\]")],
 )
-def test_an_end_without_contact_nodes_says_why(radius, held, words):
+def test_an_end_without_contact_nodes_says_why(radius, fixed_part, words):
     """A ball below the first element sees the node on the axis alone, which has no pressure."""
     tables = {
         "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
         "space": {"kinematics": "axisymmetric"},
         "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": held, "displacement": ["free", 0.0]}],
+        "fixed": [{"on": fixed_part, "displacement": ["free", 0.0]}],
         "contact": {
             "on": "bottom",
             "foundation": {"shape": "sphere", "centre": [0.0, -radius], "radius": radius},

@@ -75,8 +75,8 @@ def test_the_weighted_kernel_is_symmetric_before_its_normalisation(nodes):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_symmetric_pressure_stays_symmetric(degree):
     domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [3.0, 1.0], [12, 2])
-    held = Body(Linear(1.0, 0.3), [Fixed("top", [constant(0.0, 2)] * 2)])
-    nodes = ContactProblem(domain, held, Contact("bottom", flat()), degree=degree).nodes
+    supported = Body(Linear(1.0, 0.3), [Fixed("top", [constant(0.0, 2)] * 2)])
+    nodes = ContactProblem(domain, supported, Contact("bottom", flat()), degree=degree).nodes
     x = nodes.points[:, 0]
     bump = np.exp(-((x - 1.5) ** 2)) * (x > 0.4) * (x < 2.6)
     smooth = Smoothing(nodes, 0.7)(bump)[np.argsort(x)]

@@ -168,10 +168,10 @@ def test_ranks_without_cells_write_and_draw_too(method: str, shared_tmp_path: Pa
         assert len(list(shared_tmp_path.glob("figure-*.png"))) == 2
 
 
-def on_another(held, mesh=(), **sections):
-    """Return the solution of a block on another one, without friction, that is held or moved."""
+def on_another(support, mesh=(), **sections):
+    """Return the solution of a block on another, without friction, that is constrained or moved."""
     given = case(friction={"law": "none"}, **sections)
-    given["fixed"].append(held)
+    given["fixed"].append(support)
     given["mesh"].update(mesh)
     solution = solve(parse_case(given), comm=MPI.COMM_SELF)
     assert solution.converged

@@ -30,7 +30,7 @@ def pressed(units, size, shift, volts=None, labels=None, name="steel", **more):
 
 
 def test_steel_in_millimetres_is_as_stiff_as_in_metres():
-    """With a closed form: uniaxial plane strain, sides held."""
+    """With a closed form: uniaxial plane strain, sides constrained."""
     entry = contact.library.materials.find("steel")
     young, poisson = entry.isotropic
     modulus = young * (1 - poisson) / (1 + poisson) / (1 - 2 * poisson)

@@ -16,16 +16,16 @@ from tests.problems.mechanics import constant, flat
 SELF = MPI.COMM_SELF
 
 
-def blocks(held: bool, n: int = 6) -> ContactProblem:
+def blocks(constrained: bool, n: int = 6) -> ContactProblem:
     """Return two blocks in space; a side of both is a plane of symmetry.
 
-    The upper one is moved at its top, or loaded there and held by friction alone.
+    The upper one is moved at its top, or loaded there and constrained by friction alone.
     """
     bottom = Fixed("bottom", [constant(0.0, 3)] * 3)
     sides = Fixed("left", [constant(0.0, 3), None, None])
     top = [constant(value, 3) for value in (0.0, 0.01, -0.01)]
     fixed, loads = [bottom, sides], []
-    if held:
+    if constrained:
         fixed.append(Fixed("top", top))
     else:
         loads.append(Load("top", [constant(value, 3) for value in (0.0, 0.001, -0.01)]))

@@ -1,7 +1,7 @@
 """Domains: named parts of generated meshes, of dolfinx meshes, and of refined ones.
 
 Regions of cells, and refinement, which hands down regions and parts.
-Meshes that fall apart: every piece has to be held.
+Meshes that fall apart: every piece has to be constrained.
 """
 
 from pathlib import Path
@@ -321,7 +321,7 @@ def test_nodes_of_one_piece(share: bool, shared_tmp_path: Path) -> None:
 @pytest.mark.parallel
 def test_a_piece_that_nothing_holds_sideways_is_refused(shared_tmp_path: Path) -> None:
     case = squares(shared_tmp_path, share=False, friction=False)
-    said = r"the body about \(1.5, 0.5\) is not held.*along x"
+    said = r"the body about \(1.5, 0.5\) is not constrained.*along x"
     with pytest.raises(InputError, match=said):
         build_problem(parse_case(case), COMM)
     build_problem(parse_case(squares(shared_tmp_path, share=True, friction=False)), COMM)

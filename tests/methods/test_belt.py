@@ -205,15 +205,15 @@ def test_the_friction_that_holds_a_block_on_a_layer(dim):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_block_at_a_wall_is_held_or_not(dim):
     """At a hundredth more than friction can hold; it was lost without a word of friction."""
-    held, lost = (solve(wall(dim, part), comm=MPI.COMM_WORLD) for part in (0.99, 1.01))
-    assert held.converged and not held.outcome.overloaded
+    constrained, lost = (solve(wall(dim, part), comm=MPI.COMM_WORLD) for part in (0.99, 1.01))
+    assert constrained.converged and not constrained.outcome.overloaded
     assert not lost.converged and lost.outcome.overloaded
     assert lost.outcome.reason.startswith("the friction of the pressures that were found does not")
     (said,) = [text for text in lost.warnings if "[not-held]" in text]
     found = "the friction of the pressures that were found"
     assert f"{found} cannot hold the body (translation along {'xyz'[dim - 1]})" in said
     # Where the method stopped no node may touch: a foundation too far away is not the cause then.
-    open_nodes = (replace(found, state=found.problem.start()) for found in (lost, held))
+    open_nodes = (replace(found, state=found.problem.start()) for found in (lost, constrained))
     assert [len(list(untouched(found))) for found in open_nodes] == [0, 1]
 
 

@@ -222,7 +222,7 @@ amplitudes = { m = { time = [0.0, 1.0, 2.0], value = [0.0, 1.0, 0.0] } }
 
 @pytest.mark.parametrize("law", [{"law": "coulomb", "mu": 0.0}, {"law": "tresca", "bound": "0*x"}])
 def test_no_friction_is_solved_like_none(law):
-    """It took 44 solves instead of 7: half a ball was taken to be held by friction."""
+    """It took 44 solves instead of 7: half a ball was taken to be constrained by friction."""
     case = {
         "mesh": {"generator": "two_half_cylinders", "contact_size": 0.1, "size": 2.0},
         "material": {"young": 1000.0, "poisson": 0.3},

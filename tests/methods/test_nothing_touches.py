@@ -285,9 +285,9 @@ def test_soft_bodies_have_a_scale_of_their_own(on, ratio):
     domain = replace(domain, regions={k: v.astype(np.int32) for k, v in regions.items()})
     laws = {"soft": Linear(ratio * YOUNG, POISSON), "hard": Linear(YOUNG, POISSON)}
     materials = [Material(law, on=name) for name, law in laws.items()]
-    held = [*body("flat", 2, 2).fixed[:-1], Fixed("outer1", [-push, None])]
+    supports = [*body("flat", 2, 2).fixed[:-1], Fixed("outer1", [-push, None])]
     against = {"outer0": "inner1", "inner1": "outer0"}[on]
-    problem = Problem(domain, Body(materials, held), Contact(on, against=against))
+    problem = Problem(domain, Body(materials, supports), Contact(on, against=against))
     for options in (NewtonOptions(tolerance=100 * ratio), FixedPointOptions()):
         solution = solve(problem, options)
         assert solution.converged

@@ -375,8 +375,8 @@ def test_the_block_relaxation_solves_iteratively_over_a_foundation_with_a_given_
 def test_what_clamps_bear_does_not_hide_what_is_left_of_the_loads(poisson, far):
     """Two methods were 4e-4 apart, and said nothing: clamps bear 5000 times the loads."""
     load = {"on": "top", "traction": [0.0, -6e-10]}
-    held = [{"on": side, "displacement": [0.0, 0.0]} for side in ("left", "right")]
-    case = beam(300.0, [300, 1], load, 0.3, space={"degree": 2}, fixed=held)
+    supports = [{"on": side, "displacement": [0.0, 0.0]} for side in ("left", "right")]
+    case = beam(300.0, [300, 1], load, 0.3, space={"degree": 2}, fixed=supports)
     case["material"]["poisson"] = poisson
     case["solver"] = {"tolerance": 1e-7}  # what is granted to rounding is below it
     found = solve(parse_case(case), comm=SELF)
@@ -394,18 +394,18 @@ def curved(thickness: float, begin: float, end: float, cells: list[int]) -> Doma
 
 
 def flattened(kind: str, thickness: float, mu: float) -> Solution:
-    """Press half a ring by 8 of 20, or an arch of 60 degrees with its feet held, on a plane."""
+    """Press half a ring by 8 of 20, or an arch of 60 degrees with fixed feet, on a plane."""
     case = beam(1.0, [200, 2], TIP, 0.0, mu)
     if kind == "ring":
         domain = curved(thickness, -np.pi / 2, np.pi / 2, [200, 2])
-        held, part, level = [[0.0, "free"], [0.0, -8.0]], "top", -10.0 - thickness / 2
+        supports, part, level = [[0.0, "free"], [0.0, -8.0]], "top", -10.0 - thickness / 2
         case["load"] = []
     else:
         domain = curved(thickness, np.pi / 3, 2 * np.pi / 3, [200, 2])
-        held, part, level = [[0.0, 0.0]] * 2, "bottom", 10.0 * np.sin(np.pi / 3) - thickness
+        supports, part, level = [[0.0, 0.0]] * 2, "bottom", 10.0 * np.sin(np.pi / 3) - thickness
         pressed = 0.6 * thickness * max(thickness, 0.1)
         case["load"] = [{"on": "top", "traction": [0.0, -pressed]}]
-    ends = zip(("left", "right"), held, strict=True)
+    ends = zip(("left", "right"), supports, strict=True)
     case["fixed"] = [{"on": side, "displacement": given} for side, given in ends]
     plane = {"shape": "plane", "point": [0.0, level], "normal": [0.0, 1.0]}
     case["contact"] = {"on": part, "foundation": plane}

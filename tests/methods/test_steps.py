@@ -92,7 +92,7 @@ def test_the_area_of_the_loop_is_what_friction_takes():
     stepped = BLOCKS["coulomb"]
     problem = stepped.problem(SELF)
     found = balances(problem, steps_of(problem, stepped.times))
-    # The block's two corners are held, and half a cell of each side with them.
+    # The block's two corners are constrained, and half a cell of each side with them.
     width = problem.nodes.weight.sum()
     exact = width * stepped.dissipation
     np.testing.assert_allclose([b.dissipation for b in found], exact, rtol=1e-9, atol=1e-15)

@@ -114,7 +114,7 @@ def test_tresca_friction_is_one_step():
 
 @pytest.mark.parametrize("gap", [1e-3, 1.0, 1e3])
 def test_a_wide_gap(gap):
-    """The body is held by nothing until it touches."""
+    """The body is constrained by nothing until it touches."""
     loop = solve(pressed_block(MPI.COMM_SELF, 2, gap=gap), 1e-9)
     assert loop.state.multipliers.contact == pytest.approx(0.02, abs=1e-9)
 

@@ -117,13 +117,13 @@ def rows_of(found, nodes, numbers, matrix, count):
 
 
 @pytest.mark.core
-@pytest.mark.parametrize("held", [False, True], ids=["free", "held"])
+@pytest.mark.parametrize("constrained", [False, True], ids=["free", "constrained"])
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
-def test_the_mortar_operator_of_shares(kind, held):
+def test_the_mortar_operator_of_shares(kind, constrained):
     """The master covers a part; with nodes without multipliers, whole facets of them too."""
     slave, x = flat(kind, 7, 0.0, 1.0, 1)
     master, y = flat(kind, 5, 0.05, -1.0, 2, FIRST, size=0.61)
-    without = np.flatnonzero(x[:, 0] < 0.35) if held else np.zeros(0, dtype=np.int64)
+    without = np.flatnonzero(x[:, 0] < 0.35) if constrained else np.zeros(0, dtype=np.int64)
     whole = couple(slave, master, 1.0, no_multiplier=without)
     owners = owners_of(len(x))
     begin, end = owners.begins[COMM.rank : COMM.rank + 2]

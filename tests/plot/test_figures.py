@@ -67,7 +67,7 @@ def test_figures_begin_at_the_edge_of_the_body() -> None:
     )
     run = run_of(solve(case))
     assert run.table["x"].min() == 0.25
-    np.testing.assert_allclose(run.held, [[0.0, 0.0]], atol=1e-15)
+    np.testing.assert_allclose(run.constrained, [[0.0, 0.0]], atol=1e-15)
     assert draw_line(run).axes[0].get_xlim() == pytest.approx((0.0, 2.0))
     line = draw_plane(picture(run, "von_mises")).axes[0].lines[0].get_xdata()
     assert (np.min(line), np.max(line)) == pytest.approx((0.0, 2.0))

@@ -199,9 +199,9 @@ def test_the_pressure_of_held_nodes_is_not_known() -> None:
     run = pressed(fixed=[{"on": "top", "displacement": [0.0, 0.0, -1e-3]},
                          {"on": "left", "displacement": free}])  # fmt: skip
     zone = Zone.of(run, run.table["entry"])
-    held = zone.corners[..., 0] == 0
-    assert held.any()
-    np.testing.assert_array_equal(np.isnan(zone.pressure), held)
+    constrained = zone.corners[..., 0] == 0
+    assert constrained.any()
+    np.testing.assert_array_equal(np.isnan(zone.pressure), constrained)
 
 
 def test_the_peak_is_that_of_all_nodes() -> None:

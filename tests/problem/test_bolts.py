@@ -33,7 +33,7 @@ LENGTH, YOUNG = 2.0, 10.0
 
 
 def bar(bolt, dim=2, degree=1, rotation=0.0, **more):
-    """Return a bar that is held at its ends, or at one, with a cut across it in the middle."""
+    """Return a bar, constrained at its ends, or at one, with a cut across it in the middle."""
     size, cells = [0.5, 0.4, LENGTH][3 - dim :], [2, 2, 5][3 - dim :]
     up = "xyz"[dim - 1]
     still = [0.0] * dim
@@ -276,13 +276,13 @@ def test_forces_in_series_leave_the_piece_between_to_nothing():
 
 @pytest.mark.parallel
 def test_cuts_that_cross_make_four_pieces():
-    held = [{"on": on, "displacement": ["free", 0.0]} for on in ("bottom", "top")]
-    held.append({"on": "left", "displacement": [0.0, "free"]})
+    supports = [{"on": on, "displacement": ["free", 0.0]} for on in ("bottom", "top")]
+    supports.append({"on": "left", "displacement": [0.0, "free"]})
     bolts = {"force": 0.02}, {"force": -0.05}, "abs(x - 0.2) < 1e-6"
-    solution = solve(two(*bolts, fixed=held, contact={"on": "right"}), comm=COMM)
+    solution = solve(two(*bolts, fixed=supports, contact={"on": "right"}), comm=COMM)
     stress = at_points(solution, "stress")
     assert np.allclose(stress[:, 1, 1], 0.02 / 0.4) and np.allclose(stress[:, 0, 0], -0.05 / LENGTH)
-    free = two(*bolts, fixed=held[::2], contact={"on": "top"})
+    free = two(*bolts, fixed=supports[::2], contact={"on": "top"})
     with pytest.raises(InputError, match=r"\[unsupported\]"):
         check_problem(build_problem(free, COMM))
 
@@ -333,13 +333,13 @@ def test_two_bolts_beside_a_column_that_bears_them():
 
 @pytest.mark.parallel
 def test_a_force_that_nothing_bears_is_refused():
-    held = {"fixed": [{"on": "top", "displacement": [0.0, 0.0]}]}
+    supports = {"fixed": [{"on": "top", "displacement": [0.0, 0.0]}]}
     with pytest.raises(InputError, match=r"\[pulled-off\]"):
-        solve(bar({"force": 0.02}, **held, contact={"on": "bottom"}), comm=COMM)
-    pressed = solve(bar({"force": -0.02}, **held, contact={"on": "bottom"}), comm=COMM)
+        solve(bar({"force": 0.02}, **supports, contact={"on": "bottom"}), comm=COMM)
+    pressed = solve(bar({"force": -0.02}, **supports, contact={"on": "bottom"}), comm=COMM)
     assert pressed.contact_force[1] == pytest.approx(-0.02)
     with pytest.raises(InputError, match=r"\[unsupported\]"):
-        solve(bar({"force": 0.02}, **held), comm=COMM)
+        solve(bar({"force": 0.02}, **supports), comm=COMM)
 
 
 @pytest.mark.parallel
@@ -349,9 +349,9 @@ def test_loads_beside_a_cut_act_on_its_own_side(kind):
     pull, side = 0.03, {"on": "right", "traction": [0.0, 0.03]}
     load = {"traction": side, "body force": {"everywhere": True, "body_force": [0.0, pull / 0.4]}}
     load["total"] = {"on": "right", "force": [0.0, pull * LENGTH]}
-    held = [{"on": "bottom", "displacement": [0.0, 0.0]}]
+    supports = [{"on": "bottom", "displacement": [0.0, 0.0]}]
     contact = {"on": "left", "gap": 10.0}
-    case = bar({"shortening": 0.004}, fixed=held, load=[load[kind]], contact=contact)
+    case = bar({"shortening": 0.004}, fixed=supports, load=[load[kind]], contact=contact)
     solution = solve(case, comm=COMM)
     found = solution.movements["bolts"]["cut"]["force"]
     assert found == pytest.approx(pull * 0.6 * LENGTH, rel=1e-10)
@@ -389,8 +389,8 @@ def test_elastic_supports_beside_a_cut_hold_its_own_side(linear):
 )
 def test_supports_and_contact_that_meet_a_cut(more, words):
     """They are refused where they act across it."""
-    held = [{"on": "bottom", "displacement": [0.0, 0.0]}, *more.pop("fixed", [])]
-    case = bar({"shortening": 0.004}, rotation=more.pop("rotation", 0.0), fixed=held, **more)
+    supports = [{"on": "bottom", "displacement": [0.0, 0.0]}, *more.pop("fixed", [])]
+    case = bar({"shortening": 0.004}, rotation=more.pop("rotation", 0.0), fixed=supports, **more)
     if words:
         with pytest.raises(InputError, match=rf"{words}.*\[bolt-held\]"):
             build_problem(case, MPI.COMM_SELF)

@@ -243,7 +243,7 @@ def test_parts_inside_are_refined_with_the_mesh(cell):
 
 @pytest.mark.parallel
 def test_a_plane_inside_may_be_a_rigid_part():
-    """A block that is held at its foot and moved in the middle: nothing above is strained."""
+    """A block, constrained at its foot and moved in the middle: nothing above is strained."""
     case = {
         "mesh": {
             "generator": "rectangle",

@@ -261,16 +261,16 @@ class Softening(Damage):
 
 
 @pytest.mark.parametrize(
-    ("held", "traction", "steps", "cells"), [(0.0, 0.05, 1, 8), ("free", 0.02, 2, 16)]
+    ("across", "traction", "steps", "cells"), [(0.0, 0.05, 1, 8), ("free", 0.02, 2, 16)]
 )
-def test_a_material_that_softens_too_far_ends_the_steps(held, traction, steps, cells):
+def test_a_material_that_softens_too_far_ends_the_steps(across, traction, steps, cells):
     """Without an error: what has been solved is kept, and no support is missed."""
     given = parse_case(
         {
             "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [cells, cells // 2]},
             "material": {"young": 10.0, "poisson": 0.3},
             "fixed": [
-                {"on": "top", "displacement": [held, "-0.005*t"]},
+                {"on": "top", "displacement": [across, "-0.005*t"]},
                 {"on": "left", "displacement": [0.0, "free"]},
             ],
             "load": [{"on": "right", "traction": [f"{traction}*t", 0.0]}],

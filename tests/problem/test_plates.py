@@ -47,13 +47,13 @@ def test_columns_under_a_plate_shorten_as_hooke_says():
 def test_a_plate_in_python_is_that_of_a_case():
     """Components that are not given are 0, one angle is a number, and None leaves it free."""
     case = plate(rigid=[{"on": "top", "displacement": [0.0, "free"], "force": [0.0, -0.02]}])
-    held = Motion([0.0, None], force=[0.0, -0.02])
-    whole = held.filled(2)
+    motion = Motion([0.0, None], force=[0.0, -0.02])
+    whole = motion.filled(2)
     assert (whole.values, whole.centre) == ((0.0, None, 0.0), (0.0, 0.0))
     turned = Motion(rotation=[0.0, 0.0, 0.1], centre=[1.0, 0.0, 0.0]).filled(3)
     assert turned.values == (0.0, 0.0, 0.0, 0.0, 0.0, 0.1)
     solution = solved(case, SELF)[0]
-    same = solve(built_of(case, Rigid("top", held)), NewtonOptions(tolerance=1e-10))
+    same = solve(built_of(case, Rigid("top", motion)), NewtonOptions(tolerance=1e-10))
     assert same.pressure == pytest.approx(solution.pressure, rel=1e-12)
     for angle in (None, "free"):
         tilting = Motion([0.0, "free"], angle, [0.0, -0.02], 0.002, [1.0, 1.0])
@@ -106,13 +106,17 @@ def sheared(stretch, shear, **moves):
     """
     young, poisson = 1.0, 0.3
     lame, modulus = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 + 2 * poisson)
-    held = [("left", [0.0] * 3), ("front", ["free", 0.0, "free"]), ("back", ["free", 0.0, "free"])]
+    supports = [
+        ("left", [0.0] * 3),
+        ("front", ["free", 0.0, "free"]),
+        ("back", ["free", 0.0, "free"]),
+    ]
     traction = [-modulus * shear, 0.0, lame * stretch]
     data = {
         "mesh": {"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [4, 2, 2]},
         "space": {"degree": 2},
         "material": {"young": young, "poisson": poisson},
-        "fixed": [{"on": on, "displacement": values} for on, values in held],
+        "fixed": [{"on": on, "displacement": values} for on, values in supports],
         "load": [{"on": "top", "traction": traction}],
         "rigid": [{"on": "right", "centre": [2.0, 0.5, 0.5], "rotation": [0.0] * 3, **moves}],
         "contact": {"on": "bottom", "gap": f"{shear}*x"},

@@ -84,7 +84,7 @@ def test_bodies_that_may_pass_through_each_other_are_named():
 @pytest.mark.parallel
 @pytest.mark.parametrize("along", ["free", 0.0])
 def test_supports_of_the_first_along_its_surface(along):
-    """Its rim is held along z; on its facets themselves only y may be, as that of the second is."""
+    """Its rim is constrained along z; on its facets only y may be, as that of the second is."""
     mesh = boxes(COMM, "hexahedron", 1, [[1, 4, 1], [2, 2, 2]])
     facets, middle, *_ = midpoints(mesh)
     (x, y, z), first = middle[:, :3].T, middle[:, 0] < 1.5
@@ -93,12 +93,12 @@ def test_supports_of_the_first_along_its_surface(along):
     places["against"] = ~first & (x < 2 + 1e-9)
     mesh.geometry.x[mesh.geometry.x[:, 0] > 1.5, 0] -= 1
     domain = from_mesh(mesh, {name: facets[there] for name, there in places.items()}, 2.0)
-    held = [
+    supports = [
         Fixed("end", [1e-3, "free", "free"]), Fixed("base", [0.0, 0.0, 0.0]),
         Fixed("rim", ["free", "free", 0.0]), Fixed("on", ["free", 0.0, along]),
         Fixed("against", ["free", 0.0, "free"]),
     ]  # fmt: skip
-    given = Body(Linear(1.0, 0.3), held), Contact("on", against="against"), Friction(mu=0.3)
+    given = Body(Linear(1.0, 0.3), supports), Contact("on", against="against"), Friction(mu=0.3)
     if along == "free":
         assert COMM.allreduce(Problem(domain, *given).nodes.weight.size) >= 4
     else:

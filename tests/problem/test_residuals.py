@@ -113,14 +113,16 @@ def test_rounding_is_a_small_part_of_the_loads(solved, monkeypatch):
 def test_rounding_is_what_no_solve_gets_rid_of(degree):
     """Forces out of balance stall at a quarter of it, whatever bends; and nothing else is it."""
     load = [{"on": "top", "traction": [0.0, -1e-10]}]
-    held = [{"on": side, "displacement": [0.0, 0.0]} for side in ("left", "right")]
+    supports = [{"on": side, "displacement": [0.0, 0.0]} for side in ("left", "right")]
     section = {
         "mesh": {"generator": "rectangle", "size": [200.0, 1.0], "cells": [400, 2]},
         "space": {"degree": degree},
         "material": {"young": 1.0, "poisson": 0.3},
         "contact": {"on": "bottom", "gap": 0.1},
     }
-    solution = solve_case(parse_case({**section, "fixed": held, "load": load}), comm=MPI.COMM_SELF)
+    solution = solve_case(
+        parse_case({**section, "fixed": supports, "load": load}), comm=MPI.COMM_SELF
+    )
     problem, state = solution.problem, solution.state
     body, found = problem.body, solution.outcome.residuals
     stalled = body.norm(body.unbalanced(residual_forces(problem, state)))

@@ -50,8 +50,8 @@ def test_force_and_displacement_control_agree(dim, degree, n):
     depth = moved["rigid"]["displacement"][-1]
     assert same["rigid"]["displacement"][-1] == pytest.approx(depth, rel=1e-9)
     assert depth < -0.005
-    driven, held = solved(indented(dim, n, degree, displacement=[*still, depth]), SELF)
-    assert held["rigid"]["force"][-1] == pytest.approx(-0.01, rel=1e-10)
+    driven, summary = solved(indented(dim, n, degree, displacement=[*still, depth]), SELF)
+    assert summary["rigid"]["force"][-1] == pytest.approx(-0.01, rel=1e-10)
     scale = np.abs(driven.state.x).max()
     assert np.allclose(forced.state.x, driven.state.x, rtol=0, atol=1e-10 * scale)
 
@@ -247,8 +247,8 @@ def test_bad_rigid_parts_are_refused(rigid, words):
         build_problem(plate(rigid=rigid), SELF)
 
 
-@pytest.mark.parametrize(("end", "held"), [(2.0, True), (1.2, False)])
-def test_nodes_beyond_the_foundation_hold_nothing(end, held):
+@pytest.mark.parametrize(("end", "constrained"), [(2.0, True), (1.2, False)])
+def test_nodes_beyond_the_foundation_hold_nothing(end, constrained):
     """A block 2 x 1 on a ledge that ends at 1.2: pressed at its right end it tips."""
     ledge = {"shape": "punch", "centre": [0.5 * end, 0.0], "axis": [0.0, -1.0]}
     ledge["radius"] = 0.51 * end
@@ -264,7 +264,7 @@ def test_nodes_beyond_the_foundation_hold_nothing(end, held):
         "contact": {"on": "bottom", "foundation": ledge},
         "friction": {"law": "coulomb", "mu": 0.3},
     }
-    if held:
+    if constrained:
         build_problem(parse_case(case), SELF)
         return
     with pytest.raises(InputError, match=r"\[pulled-off\]"):

@@ -114,15 +114,15 @@ def test_other_friction_laws_leave_the_limit_as_it_is(kind, friction):
         solve(parse_case(block(kind, 1.02, **more)), comm=SELF)
 
 
-@pytest.mark.parametrize(("share", "held"), [(0.95, True), (1.05, False)])
+@pytest.mark.parametrize(("share", "constrained"), [(0.95, True), (1.05, False)])
 @pytest.mark.parametrize("kind", ["plane", "solid"])
-def test_a_given_friction_bound_holds_along_the_layer(kind, share, held):
+def test_a_given_friction_bound_holds_along_the_layer(kind, share, constrained):
     """A body force along the base slides the block where it is more than the bound on its area."""
     case = block(kind, 0.5, friction=GIVEN_BOUNDS["tresca"])
     case["fixed"] = case["fixed"][1:]
     along = [share * 0.4 * LARGEST, *[0.0] * (1 if kind == "plane" else 2)]
     case["load"].append({"everywhere": True, "body_force": along})
-    if held:
+    if constrained:
         build_problem(parse_case(case), SELF)
         return
     with pytest.raises(InputError, match=r"along it by more than friction holds.*\[pulled-off\]"):

@@ -1,4 +1,4 @@
-"""Two bodies: how they are held, and methods and ranks that agree."""
+"""Two bodies: how they are constrained, and methods and ranks that agree."""
 
 from dataclasses import replace
 
@@ -104,7 +104,7 @@ def test_penalties_find_what_friction_alone_holds(degree, gap):
 
 
 def half_facing(**layer):
-    """Return a held block that faces another one with half of its side, at a distance."""
+    """Return a constrained block that faces another one with half of its side, at a distance."""
     gap = GapFunction(lambda points: np.where(points[:, 0] < 0.6, 0.01, np.inf))
     moduli = {"upper": 1.0, "lower": 3.0}
     body = Body(
@@ -138,7 +138,7 @@ def test_nodes_that_face_nothing_touch_no_layer():
 
 
 def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
-    """It was held at rest: that it is lost on the way is no fault of the input."""
+    """It was constrained at first: that it is lost on the way is no fault of the input."""
     method = Penalty(pushed(MPI.COMM_SELF), PenaltyOptions())
     solve, calls = SparseOperator.solve, []
 
@@ -166,7 +166,7 @@ def test_ranks_agree(dim, condense):
     agree(lambda ranks: pushed(ranks, 1, dim), quantities, rtol=0, atol=1e-11)
 
 
-def held(fixed, load, mu=0.0, pair=("under", "over")):
+def supported(fixed, load, mu=0.0, pair=("under", "over")):
     body = Body(Linear(1.0, 0.3), fixed, [load])
     friction = Friction(ConstantCoefficient(mu)) if mu > 0 else Friction()
     domain = Blocks(2, 3, 4).domain(MPI.COMM_SELF)
@@ -182,17 +182,17 @@ PRESS, PULL = (Load("top", [ZERO, constant(force, 2)]) for force in (-0.01, 0.01
 def test_a_body_may_be_held_by_contact_alone(pair):
     """It is where loads press it on; supports, or friction, have to do the rest."""
     clamped, guided = Fixed("bottom", [ZERO, ZERO]), Fixed("upper_left", [ZERO, None])
-    check_rigid_modes(held([clamped, guided], PRESS, pair=pair))
-    check_rigid_modes(held([clamped], PRESS, mu=0.2, pair=pair))
+    check_rigid_modes(supported([clamped, guided], PRESS, pair=pair))
+    check_rigid_modes(supported([clamped], PRESS, mu=0.2, pair=pair))
     with pytest.raises(InputError, match=r"\[unsupported\]"):
-        check_rigid_modes(held([clamped], PRESS, pair=pair))
+        check_rigid_modes(supported([clamped], PRESS, pair=pair))
     with pytest.raises(InputError, match=r"\[pulled-off\]"):
-        check_rigid_modes(held([clamped, guided], PULL, pair=pair))
+        check_rigid_modes(supported([clamped, guided], PULL, pair=pair))
     with pytest.raises(InputError, match=r"\[unsupported\]"):
-        check_rigid_modes(held([guided], PRESS, mu=0.0, pair=pair))
+        check_rigid_modes(supported([guided], PRESS, mu=0.0, pair=pair))
     # Both of them together, along the rollers of the lower one.
     with pytest.raises(InputError, match=r"\[unsupported\]"):
-        check_rigid_modes(held([Fixed("bottom", [None, ZERO])], PRESS, mu=0.5, pair=pair))
+        check_rigid_modes(supported([Fixed("bottom", [None, ZERO])], PRESS, mu=0.5, pair=pair))
 
 
 @pytest.mark.core

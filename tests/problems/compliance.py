@@ -28,7 +28,7 @@ LINEAR_TO_LIMIT, CONSTANT = Compliance(0.1), PotentialFactor(60.0)
 
 @dataclass(frozen=True)
 class LayerColumn:
-    """A column on a layer from 0.1 to 0.3, held sideways, its top lowered by `push`."""
+    """A column on a layer from 0.1 to 0.3, constrained sideways, its top lowered by `push`."""
 
     push: float
     piezo: bool = False
@@ -90,8 +90,8 @@ class LayerColumn:
         potential = constant(self.top, dim) if self.piezo else None
         fixed = [Fixed("top", lowered, potential)]
         for side, axis in sides.items():
-            held = [zero if i == axis else None for i in range(dim)]
-            fixed.append(Fixed(side, held))
+            constrained = [zero if i == axis else None for i in range(dim)]
+            fixed.append(Fixed(side, constrained))
         piezo = hexagonal(-5.4, E33, 12.3, BETA11, BETA33) if self.piezo else None
         if piezo is not None and dim == 2:
             piezo = piezo.in_plane()

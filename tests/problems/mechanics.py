@@ -114,7 +114,7 @@ def bar(
 
 
 def leaning_block(comm: MPI.Comm, n: int = 3, degree: int = 1, mu: float = 0.3) -> ContactProblem:
-    """Return a block of 2 x 1 x 1, held at the left, pressed and pushed aside on top."""
+    """Return a block of 2 x 1 x 1, constrained at the left, pressed and pushed aside on top."""
     domain = box(comm, [0.0, 0.0, 0.0], [2.0, 1.0, 1.0], [2 * n, n, n])
     zero = constant(0.0, 3)
     body = Body(
@@ -171,7 +171,7 @@ class SlidingBlock:
         degrees: float = 0.0,
         axis: Sequence[float] = (0.0, 1.0, 0.0),
     ) -> ContactProblem:
-        """Return the problem, turned with its foundation; in 3-D front and back are held across."""
+        """Return the problem, turned with its foundation; in 3-D front and back are fixed."""
         q = turn(dim, degrees, axis)
         gradient = np.zeros((dim, dim))
         gradient[0, -1], gradient[-1, -1] = self.shear, -self.squeeze

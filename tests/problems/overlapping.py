@@ -145,15 +145,15 @@ def of_layer(domain: Domain, number: int) -> np.ndarray:
 
 
 def body(form: str, dim: int, layers: int, traction: float = 0.0) -> Body:
-    """Return the body between rollers; its end is held where no traction pulls at it."""
+    """Return the body between rollers; its end is constrained where no traction pulls at it."""
     across = {"below": 1, "above": 0 if form == "ring" else 1, "front": 2, "back": 2}
-    held = list(across.items())[: 2 * dim - 2]
+    supports = list(across.items())[: 2 * dim - 2]
     last, loads = f"outer{layers - 1}", []
     if form == "flat":
-        held += [("inner0", 0)] + ([(last, 0)] if traction == 0 else [])
+        supports += [("inner0", 0)] + ([(last, 0)] if traction == 0 else [])
         if traction != 0:
             loads = [Load(last, [traction] + [0.0] * (dim - 1))]
-    fixed = [Fixed(part, [0.0 if i == k else None for i in range(dim)]) for part, k in held]
+    fixed = [Fixed(part, [0.0 if i == k else None for i in range(dim)]) for part, k in supports]
     return Body(Linear(YOUNG, POISSON), fixed, loads)
 
 

@@ -103,7 +103,7 @@ class Column:
         gradient = np.zeros((dim, dim))
         gradient[-1, -1] = exact
         imposed = affine_vector(q @ gradient @ q.T, np.zeros(dim))
-        if degrees == 0:  # held sideways only, as the column is meant
+        if degrees == 0:  # constrained sideways only, as the column is meant
             fixed = []
             for i, side in enumerate(sides):
                 free: list[Affine | None] = [None] * dim

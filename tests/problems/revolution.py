@@ -70,9 +70,9 @@ class Tube:
         element: str = "standard",
     ) -> ContactProblem:
         domain = half_plane(comm, self.inner, self.outer, 0.5, n)
-        held = [Fixed(side, [None, ZERO]) for side in ("bottom", "top")]
+        supports = [Fixed(side, [None, ZERO]) for side in ("bottom", "top")]
         load = Load("left", pressure=constant(self.pressure, 2))
-        body = Body(self.law, held, [load])
+        body = Body(self.law, supports, [load])
         contact = Contact("right", flat(self.gap))
         return ContactProblem(domain, body, contact, degree=degree, element=element)
 

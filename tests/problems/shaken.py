@@ -39,13 +39,13 @@ SHEAR = tabulated(tuple(STAGES), (0.0, 0.0, 1.0, -1.0, 0.0))
 def shaken(law=None, degree=1, mu=0.4, comm=SELF) -> ContactProblem:
     """Return a block whose top is pressed down, then moved to and fro."""
     down, along = constant(-0.01, 2), constant(0.006, 2)
-    held = [
+    supports = [
         Fixed("top", [None, down], amplitude=PRESS),
         Fixed("top", [along, None], amplitude=SHEAR),
     ]
     return ContactProblem(
         rectangle(comm, [0.0, 0.0], [2.0, 1.0], [16, 6]),
-        Body(law or Linear(1.0, 0.3), held),
+        Body(law or Linear(1.0, 0.3), supports),
         Contact("bottom", GapFunction(lambda x: 0.001 * (x[:, 0] - 1) ** 2)),
         Friction(ConstantCoefficient(mu)),
         degree=degree,

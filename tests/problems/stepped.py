@@ -41,14 +41,14 @@ class SteppedBlock:
         """The block at the end of each step."""
         found, slip, way = [], 0.0, 0.0
         for push in self.pushes:
-            held = replace(self.block, push=push, slip=slip)
+            moved = replace(self.block, push=push, slip=slip)
             if self._beyond(slip, push, slip, way) > 0:
                 # Towards the push until friction is enough: at the push there is no stress.
                 end = brentq(self._beyond, slip, push, (push, slip, way), xtol=1e-15)
-                held = replace(held, slip=float(end))
-            way += abs(held.slip - slip)
-            slip = held.slip
-            found.append(held)
+                moved = replace(moved, slip=float(end))
+            way += abs(moved.slip - slip)
+            slip = moved.slip
+            found.append(moved)
         return found
 
     def _beyond(self, slip: float, push: float, before: float, way: float) -> float:

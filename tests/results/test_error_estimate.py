@@ -179,23 +179,25 @@ def test_effectivity_at_edges(name):
 @pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_no_error_where_the_solution_is_exact_in_each_material(degree):
-    """A column of two materials, held sideways: sigma_xx jumps, and no recovery may see that."""
+    """A column of two materials, constrained sideways: no recovery may see the jump of sigma_xx."""
     plane = rectangle(MPI.COMM_SELF, (0.0, 0.0), (1.0, 2.0), (4, 8))
     regions = {"low": lambda x: x[1] <= 1 + 1e-9, "high": lambda x: x[1] >= 1 - 1e-9}
     domain = from_mesh(plane.mesh, plane.parts, regions=regions)
     materials = [Material(Linear(1.0, 0.1), on="low"), Material(Linear(3.0, 0.4), on="high")]
     sides = [Fixed(part, [0.0, "free"]) for part in ("left", "right")]
-    held = [*sides, Fixed("top", ["free", -0.02])]
+    supports = [*sides, Fixed("top", ["free", -0.02])]
     for law in (materials, Linear(1.0, 0.1)):
-        problem = ContactProblem(domain, Body(law, held), Contact("bottom", flat()), degree=degree)
+        problem = ContactProblem(
+            domain, Body(law, supports), Contact("bottom", flat()), degree=degree
+        )
         found = estimated(problem, state_of(problem))
         assert found.total - found.contact < 1e-18 * found.energy
         # Of gaps there is their rounding.
         assert found.contact < 1e-9 * found.energy
 
 
-def inside(dim, cell, held, **more):
-    """Return a column on a foundation, held sideways, with a part inside at its middle."""
+def inside(dim, cell, supports, **more):
+    """Return a column on a foundation, constrained sideways, with a part inside at its middle."""
     sides = ("left", "right") if dim == 2 else ("left", "right", "front", "back")
     free = ["free"] * (dim - 1)
     across = [[0.0, "free"], [0.0, "free"]] if dim == 2 else [[0.0, "free", "free"]] * 2
@@ -210,7 +212,7 @@ def inside(dim, cell, held, **more):
         "material": {"young": 1.0, "poisson": 0.3},
         "fixed": [
             *({"on": on, "displacement": u} for on, u in zip(sides, across, strict=False)),
-            *({"on": on, "displacement": [*free, u]} for on, u in held.items()),
+            *({"on": on, "displacement": [*free, u]} for on, u in supports.items()),
         ],
         "contact": {"on": "bottom"},
         **more,
@@ -220,7 +222,7 @@ def inside(dim, cell, held, **more):
 @pytest.mark.parallel
 @pytest.mark.parametrize("cell", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
 def test_no_error_where_the_solution_is_exact_on_both_sides_of_a_part_inside(cell):
-    """Pushed down in the middle and held above: the stress jumps there, and is uniform else."""
+    """Pushed down in the middle and constrained above: the stress jumps there alone."""
     dim = 2 if cell in ("triangle", "quadrilateral") else 3
     found = solve(parse_case(inside(dim, cell, {"middle": -1e-3, "top": 1e-3}))).error
     assert found.energy > 0
@@ -303,8 +305,8 @@ def test_the_energy_of_a_piezoelectric_body(dim):
     make = rectangle if dim == 2 else box
     domain = make(MPI.COMM_SELF, [0.0] * dim, [1.0] * dim, [2] * dim)
     material = Material(Linear(58.7, 0.39), pzt(dim))
-    held = Fixed("top", [0.0] * dim, potential=0.0)
-    problem = ContactProblem(domain, Body(material, held), Contact("bottom", flat()), degree=2)
+    support = Fixed("top", [0.0] * dim, potential=0.0)
+    problem = ContactProblem(domain, Body(material, support), Contact("bottom", flat()), degree=2)
     body, start = problem.body, problem.start()
     x = np.random.default_rng(1).standard_normal(start.x.size)
     at = fields_of(body, material, body.function(x))
@@ -554,9 +556,12 @@ def test_fibres_lock():
 @pytest.mark.parametrize("sides", [["left"], ["left", "right"]])
 def test_exact_solutions_do_not_lock(sides):
     """Uniform strains of a nearly incompressible block: it was said to be too stiff."""
-    held, load = [{"on": side, "symmetry": "x"} for side in sides], {"on": "top", "pressure": 1e-3}
+    supports, load = (
+        [{"on": side, "symmetry": "x"} for side in sides],
+        {"on": "top", "pressure": 1e-3},
+    )
     soft = {"young": 1.0, "poisson": 0.4999}
-    tables = clamped([1.0, 1.0], [4, 4], material=soft, fixed=held, load=[load])
+    tables = clamped([1.0, 1.0], [4, 4], material=soft, fixed=supports, load=[load])
     solution = solve(parse_case(tables), comm=MPI.COMM_SELF)
     assert solution.error.stiffness_ratio > 1000
     assert solution.error.relative < 1e-6

@@ -17,17 +17,17 @@ UPRIGHT = {"on": "upper_cut", "displacement": [0.0, "free"]}
 
 
 @pytest.mark.parametrize(
-    ("friction", "held", "warned"),
+    ("friction", "supports", "warned"),
     [
         ({"law": "none"}, [], True),
         ({"law": "none"}, [UPRIGHT], False),
         ({"law": "coulomb", "mu": 0.3}, [], False),
     ],
 )
-def test_a_cylinder_that_can_roll_in_its_place(friction, held, warned):
+def test_a_cylinder_that_can_roll_in_its_place(friction, supports, warned):
     """Without friction it does so against what the mesh makes of the circle."""
     given = case(**CYLINDERS, friction=friction)
-    given["fixed"] = given["fixed"] + held
+    given["fixed"] = given["fixed"] + supports
     solution = solve(parse_case(given), comm=MPI.COMM_SELF)
     assert solution.converged
     assert any("by next to nothing" in warning for warning in solution.warnings) == warned

@@ -21,11 +21,11 @@ PRESSURE = 0.1
 
 def pressed(dim: int, degree: int, **sections: object):
     """Return a block under a uniform pressure, free to grow sideways: a homogeneous state."""
-    held = [{"on": "left", "displacement": [0.0, *["free"] * (dim - 1)]}]
+    supports = [{"on": "left", "displacement": [0.0, *["free"] * (dim - 1)]}]
     if dim == 3:
-        held.append({"on": "front", "displacement": ["free", 0.0, "free"]})
+        supports.append({"on": "front", "displacement": ["free", 0.0, "free"]})
     case = {
-        "fixed": held,
+        "fixed": supports,
         "load": [{"on": "top", "pressure": PRESSURE}],
         "friction": {},
         "material": {"young": 10.0, "poisson": 0.3},
@@ -56,11 +56,11 @@ def test_a_homogeneous_state(dim: int, degree: int, shared_tmp_path: Path) -> No
 @pytest.mark.parametrize("dim", [2, 3])
 def test_supports_balance_contact(dim: int) -> None:
     """Forces and moments of two supports, of which one shares nodes with the other."""
-    held = [
+    supports = [
         {"on": "top", "displacement": [0.02, *[0.0] * (dim - 2), "-0.02-0.02*x"]},
         {"on": "left", "displacement": [0.02, *["free"] * (dim - 1)]},
     ]
-    solution = solve(block(dim, fixed=held))
+    solution = solve(block(dim, fixed=supports))
     supports = solution.supports
     assert set(supports) == {"top", "left"}
     force = sum(support.force for support in supports.values())

@@ -263,8 +263,8 @@ def test_a_weight_needs_contact_however_hard_jaws_clamp(tmp_path):
 @pytest.mark.parallel
 @pytest.mark.parametrize("seed", range(3))
 def test_a_ring_that_is_squeezed_without_friction_too(seed):
-    held = solve(squeezed("newton"), domain=between_plates(MPI.COMM_WORLD, seed))
-    assert held.converged and held.problem.frictional and not held.jammed
+    found = solve(squeezed("newton"), domain=between_plates(MPI.COMM_WORLD, seed))
+    assert found.converged and found.problem.frictional and not found.jammed
 
 
 FALLING = "friction.mu={law='slip', a=0.5, b=0.2, rho=1e4}"

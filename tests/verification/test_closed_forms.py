@@ -80,7 +80,7 @@ def test_sliding_block(name, dim, degree):
 def test_rotation_changes_nothing(name, dim, axis, degree):
     block = BLOCKS[name]
     turned = solved(block, dim, degree, 30.0, axis)
-    # With no rotation, the same components are held.
+    # With no rotation, the same components are constrained.
     straight = solved(block, dim, degree, 1e-300, axis)
     back = nodal_displacement(turned) @ turn(dim, 30.0, axis)
     assert np.abs(back - nodal_displacement(straight)).max() < 1e-11

@@ -160,14 +160,14 @@ def test_overlaps_are_pressed_out_in_space(cell, element):
 def test_a_negative_gap_is_an_interference(form, element):
     """The case file says the same of meshes that touch as of those that overlap."""
     order, degree = element
-    held = {"flat": [("inner0", [0.0, "free"]), ("outer1", [0.0, "free"])]}.get(form, [])
-    held += [
+    supports = {"flat": [("inner0", [0.0, "free"]), ("outer1", [0.0, "free"])]}.get(form, [])
+    supports += [
         ("below", ["free", 0.0]),
         ("above", [0.0, "free"] if form == "ring" else ["free", 0.0]),
     ]
     case = {
         "material": {"young": YOUNG, "poisson": POISSON},
-        "fixed": [{"on": part, "displacement": given} for part, given in held],
+        "fixed": [{"on": part, "displacement": given} for part, given in supports],
         "space": {"degree": degree},
     }
     depth, found = 1e-3, []
@@ -192,9 +192,9 @@ def test_rigid_foundations(degree):
     for share in SHARES:
         depth = share / 4
         plane = Plane((1.0 + depth, 0.0), (1.0, 0.0))
-        held = [Fixed("below", [None, 0.0]), Fixed("above", [None, 0.0])]
-        held += [Fixed(part, [0.0, None]) for part in ("outer0", "inner1")]
-        ring = Body(Linear(YOUNG, POISSON), held)
+        supports = [Fixed("below", [None, 0.0]), Fixed("above", [None, 0.0])]
+        supports += [Fixed(part, [0.0, None]) for part in ("outer0", "inner1")]
+        ring = Body(Linear(YOUNG, POISSON), supports)
         with pytest.raises(InputError, match=r"\[overlap\]"):
             Problem(domain, ring, Contact("inner0", plane), degree=degree)
         for contact in (Contact("inner0", plane, press=True), Contact("inner0", -depth)):
@@ -338,12 +338,14 @@ def corners(cell, order):
     numbers = [[4, 2], [2, 2]] if d == 2 else [[3, 1, 3], [2, 2, 2]]
     for edges in CORNERS[d] + (CONES if d == 2 else []):
         axis = edges in CONES
-        held = [Fixed(part, [None if axis else 0.0, *[0.0] * (d - 1)]) for part in ("base", "end")]
+        supports = [
+            Fixed(part, [None if axis else 0.0, *[0.0] * (d - 1)]) for part in ("base", "end")
+        ]
 
         def mesh(depth, edges=edges, axis=axis):
             return corner(COMM, cell, order, edges, depth, numbers, axis)
 
-        yield mesh, Body(Linear(YOUNG, POISSON), held), axis
+        yield mesh, Body(Linear(YOUNG, POISSON), supports), axis
 
 
 @pytest.mark.parallel
@@ -441,8 +443,8 @@ def test_a_press_beyond_the_end_of_one_side(cell):
         domain = layers(COMM, cell, 1, "flat", 0.002, counts=counts)
         x, second = domain.mesh.geometry.x, overlapping.of_layer(domain, 1)
         x[second, 1] = 0.12 + (end - 0.12) * x[second, 1]
-        held = [Fixed(part, [0.0] * d) for part in ("inner0", "outer1", "above")]
-        given = Body(Linear(YOUNG, POISSON), held)
+        supports = [Fixed(part, [0.0] * d) for part in ("inner0", "outer1", "above")]
+        given = Body(Linear(YOUNG, POISSON), supports)
         on, against = ("inner1", "outer0") if backwards else ("outer0", "inner1")
         contact = Contact(on, against=against, press=True)
         solution = solve(Problem(domain, given, contact, degree=degree))

@@ -98,8 +98,8 @@ def everywhere_the_same(solution, dim, rtol=1e-11):
     problem, state = solution.problem, solution.state
     assert solution.converged, solution.reason
     nodes = problem.nodes
-    held = np.linalg.norm(nodes.admissible_normal - nodes.normal, axis=1) > 0.01
-    assert COMM.allreduce(np.count_nonzero(held)) >= dim - 1
+    constrained = np.linalg.norm(nodes.admissible_normal - nodes.normal, axis=1) > 0.01
+    assert COMM.allreduce(np.count_nonzero(constrained)) >= dim - 1
     np.testing.assert_allclose(solution.pressure, PRESSURE, rtol=rtol)
     area = nodes.sum(np.ones(nodes.gap.size))
     assert area == pytest.approx(1 / upward(dim)[-1], rel=1e-12)
@@ -248,10 +248,10 @@ def test_friction_has_no_part_along_directions_that_are_held(mu):
     """At the node that the side pushes there is none: its pressure bears that share."""
     solution = solve(ramp(0.1, mu), METHODS["dense"])
     nodes = solution.problem.nodes
-    held = nodes.points[:, 0] < 1e-9
-    assert np.abs(solution.friction[held]).max() == 0
-    slides = np.linalg.norm(solution.friction[~held], axis=1)
-    np.testing.assert_allclose(slides, mu * solution.pressure[~held], rtol=1e-8, atol=1e-12)
+    constrained = nodes.points[:, 0] < 1e-9
+    assert np.abs(solution.friction[constrained]).max() == 0
+    slides = np.linalg.norm(solution.friction[~constrained], axis=1)
+    np.testing.assert_allclose(slides, mu * solution.pressure[~constrained], rtol=1e-8, atol=1e-12)
     assert force_balance(solution.problem, solution.state).imbalance < 1e-12
 
 
@@ -270,8 +270,8 @@ def test_the_node_that_is_held_alone_is_off():
         contact = Contact("bottom", 0.0, friction=Friction(ConstantCoefficient(mu)))
         body = Body(Linear(1e3, 0.3), [Fixed("left", [0.0, None])], loads)
         solution = solve(Problem(domain, body, contact), METHODS["dense"])
-        held = solution.problem.nodes.points[:, 0] < 1e-9
-        np.testing.assert_allclose(solution.pressure[held], p * (1 + mu * slope), rtol=1e-6)
+        constrained = solution.problem.nodes.points[:, 0] < 1e-9
+        np.testing.assert_allclose(solution.pressure[constrained], p * (1 + mu * slope), rtol=1e-6)
         off.append(np.linalg.norm(solution.contact_force - exact))
     np.testing.assert_allclose(off, mu * p * (1 + slope**2) / np.array([8, 16, 32]), rtol=1e-6)
 

@@ -222,7 +222,7 @@ def test_a_rim_that_is_held_carries_no_multiplier(
 @pytest.mark.parallel
 @pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
 def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int, cell: str) -> None:
-    """Friction acts there on the other body, which is not held: a constant shear passes."""
+    """Friction acts there on the other body, which is not constrained: a constant shear passes."""
     given = blocks(dim, cell=cell)
     along = [Affine(tuple(row)) for row in strain_of(given)[:-1]]
     check_constant_stress(given, degree, PAIRS[0], Fixed("upper_left", [*along, None]))

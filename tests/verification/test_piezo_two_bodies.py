@@ -33,7 +33,7 @@ def columns(
     Parameters
     ----------
     electrode
-        Charge of the upper electrode; None where that is held at `VOLTS`.
+        Charge of the upper electrode; None where that is prescribed as `VOLTS`.
     conductance
         Of what is between them.
     degree

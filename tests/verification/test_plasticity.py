@@ -184,7 +184,7 @@ def test_plane_strain_in_eight_times_as_many_steps():
 )
 def test_against_an_integration_of_its_own(kind, degree, law):
     values = path(*ENDS, steps=4)
-    # The first direction is the driven one, the last one is held in plane strain.
+    # The first direction is the driven one, the last one is constrained in plane strain.
     free = [1] if kind in ("plane", "space") else [1, 2]
     known = integrated(YOUNG, 0.3, YIELD, *LAWS[law][1:], free, values)
     solution = run(kind, material(law), values, degree=degree)
@@ -193,8 +193,8 @@ def test_against_an_integration_of_its_own(kind, degree, law):
         stress, a = found(solution, step)
         assert stress[up, up] == pytest.approx(expected[0], abs=1e-10)
         assert a == pytest.approx(expected[3], abs=1e-10)
-        held = {"plane": (2, 2), "space": (1, 1)}.get(kind)
-        assert held is None or stress[held] == pytest.approx(expected[2], abs=1e-10)
+        constrained = {"plane": (2, 2), "space": (1, 1)}.get(kind)
+        assert constrained is None or stress[constrained] == pytest.approx(expected[2], abs=1e-10)
 
 
 @pytest.mark.core

@@ -67,12 +67,12 @@ def test_no_node_is_in_the_ball():
 @pytest.mark.parallel
 @pytest.mark.parametrize("method", [NewtonOptions(tolerance=1e-11), FixedPointOptions()])
 def test_current_through_nodes_that_are_held(comm, method):
-    """Closed form 3 with all sides held: the rim of Gamma_3 cannot move, but conducts."""
+    """Closed form 3 with all sides constrained: the rim of Gamma_3 cannot move, but conducts."""
     column = Column(k_e=2.0, phi_f=32.0)
     problem = column.problem(comm, 3, degree=2, degrees=30.0)
-    held = problem.interface.fixed_conducting
-    assert held is not None
-    assert comm.allreduce(held.nodes.nodes.size) > 0
+    constrained = problem.interface.fixed_conducting
+    assert constrained is not None
+    assert comm.allreduce(constrained.nodes.nodes.size) > 0
     solution = solve(problem, method.model_copy(update={"tolerance": 1e-10}))
     assert solution.converged
     _, bottom = column.solution()

@@ -112,8 +112,8 @@ def test_bodies_that_touch_in_files_of_seven_digits(cell, thickness):
         d, x = domain.dim, domain.mesh.geometry.x
         turn = np.linalg.qr(np.random.default_rng(4).standard_normal((d, d)))[0]
         x[:, :d] = np.float32(x[:, :d] @ turn * np.linalg.det(turn) + shift)
-        held = [Fixed("inner0", [0.0] * d), Fixed("outer1", [0.0] * d)]
-        given = Body(Linear(YOUNG, POISSON), held)
+        supports = [Fixed("inner0", [0.0] * d), Fixed("outer1", [0.0] * d)]
+        given = Body(Linear(YOUNG, POISSON), supports)
         for on, against in (("outer0", "inner1"), ("inner1", "outer0")):
             nodes = Problem(domain, given, Contact(on, against=against), degree=degree).nodes
             assert nodes.maximum(np.abs(nodes.gap)) < 1e-6

@@ -254,8 +254,8 @@ def _balance(
     residual += action
     fixed = np.zeros(residual.shape, dtype=bool)
     for support in tables["fixed"]:
-        held = [component != "free" for component in support["displacement"]]
-        fixed[mesh.nodes(support["on"])] |= held
+        constrained = [component != "free" for component in support["displacement"]]
+        fixed[mesh.nodes(support["on"])] |= constrained
     for node, neighbour, force in shared:
         size = float(force @ force)
         part = float(np.clip(residual[node] @ force / size, 0, 1)) if size > 0 else 0.0
