@@ -213,12 +213,12 @@ def check_slope(
     low, high, given = every
     with np.errstate(all="ignore"):
         central = (high - low) / (2 * h)
-        rounding = EPS * np.maximum(np.abs(low), np.abs(high)) / h
-        off = np.abs(given - central) - OFF * np.abs(central) - SEEN * rounding
+        roundoff = EPS * np.maximum(np.abs(low), np.abs(high)) / h
+        off = np.abs(given - central) - OFF * np.abs(central) - SEEN * roundoff
     wrong = np.isfinite(off) & (off > 0)
     if np.count_nonzero(wrong) < SHARE * at.size:
         return
-    worst = np.argmax(np.where(wrong, off / (OFF * np.abs(central) + SEEN * rounding + TINY), 0))
+    worst = np.argmax(np.where(wrong, off / (OFF * np.abs(central) + SEEN * roundoff + TINY), 0))
     raise InputError(
         f"{name}: {given[worst]:.4g} at {at[worst]:.3g}, where differences of the values are "
         f"{central[worst]:.4g}; accepted: the derivative of the law",

@@ -86,8 +86,8 @@ class Axisymmetric:
         if self.on_axis:
             # Rounding may put points a little beside the axis.
             jacobian = ufl.Jacobian(extract_unique_domain(u))
-            rounding = 1e-9 * ufl.sqrt(ufl.inner(jacobian, jacobian))
-            hoop = ufl.conditional(ufl.gt(r, rounding), hoop, grad[0, 0])
+            rounding_length = 1e-9 * ufl.sqrt(ufl.inner(jacobian, jacobian))
+            hoop = ufl.conditional(ufl.gt(r, rounding_length), hoop, grad[0, 0])
         return embed(grad, hoop)
 
     def extent(self, x: Expr) -> Expr:

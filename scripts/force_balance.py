@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.problem.problem import ContactProblem
-from contact.problem.residuals import force_rounding, residual_forces
+from contact.problem.residuals import residual_forces, rounding_forces
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -25,8 +25,8 @@ class ForceBalance:
     contact: Array
     #: Force on the side `on` of each of the contacts, shape (contacts, d).
     passed: Array
-    #: Rounding floor of these sums: see `force_rounding`.
-    rounding: float
+    #: Rounding floor of these sums: see `rounding_forces`.
+    rounding_force: float
 
     @property
     def imbalance(self) -> float:
@@ -38,7 +38,7 @@ class ForceBalance:
         parts = self.applied, self.supports, *self.passed
         scale = sum(float(np.linalg.norm(part)) for part in parts)
         total = self.applied + self.supports + self.contact
-        return float(np.linalg.norm(total)) / scale if scale > self.rounding else 0.0
+        return float(np.linalg.norm(total)) / scale if scale > self.rounding_force else 0.0
 
 
 def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
@@ -56,5 +56,5 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     passed = [part.sum(axis=0) for part in np.split(forces, ends)]
     local = np.stack([given, supports, contact, *passed])
     total = problem.domain.resultant(problem.comm.allreduce(local, op=MPI.SUM))
-    rounding = np.linalg.norm(force_rounding(problem, state, body.internal_forces(state))[0])
-    return ForceBalance(total[0], total[1], total[2], total[3:], float(rounding))
+    rounding_force = np.linalg.norm(rounding_forces(problem, state, body.internal_forces(state))[0])
+    return ForceBalance(total[0], total[1], total[2], total[3:], float(rounding_force))

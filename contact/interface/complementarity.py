@@ -58,13 +58,13 @@ def interface_residuals(
     jump: Array,
     multipliers: Multipliers,
     bound: Array,
-    rounding: Array | float = 0.0,
+    rounding_norms: Array | float = 0.0,
 ) -> tuple[Array, Array]:
     """Return the contact and friction residuals (16) and their floors, (2,). Collective.
 
     The `worst` of the connected components, each relative to max(|p|, 1e-4 E/L |g|) with
     p = -sigma_nu, norms in L2(Gamma_3): g is |g_N|, at most the displacement of the node and the
-    size. `rounding` is that of the pressures of each component, in L2(Gamma_3).
+    size. `rounding_norms` are the roundings of the pressures of each component, in L2(Gamma_3).
     """
     c_r, normal_gap = interface.c_r, interface.normal_gap(jump)
     contact = multipliers.contact - project_half_line(multipliers.contact - c_r * normal_gap)
@@ -81,7 +81,7 @@ def interface_residuals(
     gap_stress = interface.norms(interface.stiffness * gap)
     total = interface.norms(interface.pressure(jump, multipliers))
     # Without pressure nodes may just touch: their gaps are rounding too.
-    rounding_stress = interface.norms(np.full_like(motion, interface.rounding_pressure(jump)))
+    rounding_stress = interface.norms(np.full_like(motion, interface.rounding_stress(jump)))
     motion_stress = interface.norms(interface.stiffness * np.minimum(now, interface.size))
     gap_stress = np.where(
         total <= rounding_stress, np.maximum(gap_stress, motion_stress), gap_stress
@@ -90,7 +90,7 @@ def interface_residuals(
     scale = np.maximum(scale, EPS * scale.max())
     norms = np.array([interface.norms(contact), interface.norms(friction)])
     scale = np.where(scale > 0, scale, 1.0)
-    return worst(norms / scale, np.broadcast_to(rounding / scale, norms.shape))
+    return worst(norms / scale, np.broadcast_to(rounding_norms / scale, norms.shape))
 
 
 def worst(residuals: Array, floors: Array) -> tuple[Array, Array]:

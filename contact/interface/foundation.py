@@ -76,8 +76,10 @@ class NormalGraph:
         for sweep in range(90):
             excess, slope = r * u_n + layer - z, r + steep
             # Below this the excess is rounding in u_n.
-            rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(u_n) + np.abs(self.rho_0)))
-            done |= np.abs(excess) <= rounding
+            rounding_stress = (
+                4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(u_n) + np.abs(self.rho_0)))
+            )
+            done |= np.abs(excess) <= rounding_stress
             if np.all(done):
                 break
             low, high = np.where(excess < 0, u_n, low), np.where(excess > 0, u_n, high)

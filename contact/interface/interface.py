@@ -190,17 +190,19 @@ class Interface:
         multipliers: Multipliers,
         bound: Array,
         c: float | None = None,
-        rounding: float = 0.0,
+        rounding_stress: float = 0.0,
     ) -> ActiveSet:
         """Return the active set: open, stick, slip.
 
-        `c` (c_0 by default) and `rounding` are those of `constraint_active`.
+        `c` (c_0 by default) and `rounding_stress` are those of `constraint_active`.
         """
         c = self.c_0 if c is None else c
-        closed = constraint_active(multipliers.contact, self.normal_gap(jump), c, rounding)
+        closed = constraint_active(multipliers.contact, self.normal_gap(jump), c, rounding_stress)
         if not self.friction.acts:
             return ActiveSet.without_slip(closed, False)
-        return ActiveSet.of(closed, multipliers.friction, self.slip(jump), bound, c, rounding)
+        return ActiveSet.of(
+            closed, multipliers.friction, self.slip(jump), bound, c, rounding_stress
+        )
 
     def node_counts(self, jump: Array, active: ActiveSet) -> tuple[int, int, int]:
         """Return the numbers of open, stick and slip nodes; layer contact is closed. Collective."""
@@ -210,14 +212,14 @@ class Interface:
         opened, stick, slip = (int(count) for count in summed(self.comm, local))
         return opened, stick, slip
 
-    def rounding_pressure(self, jump: Array) -> float:
+    def rounding_stress(self, jump: Array) -> float:
         """Return the pressure of a rounding of the displacements (stress). Collective."""
         displacement = np.abs(jump[:, : self.nodes.dim]).max(axis=1, initial=0.0)
         return 2 * ROUNDING * self.c_0 * self.nodes.maximum(displacement)
 
     def negligible(self, jump: Array, pressure: Array) -> float:
         """Return the rounding of pressures, by displacements or the largest one. Collective."""
-        return max(NEGLIGIBLE * self.nodes.maximum(pressure), self.rounding_pressure(jump))
+        return max(NEGLIGIBLE * self.nodes.maximum(pressure), self.rounding_stress(jump))
 
     def acting(
         self, x: Array, multipliers: Multipliers

@@ -98,14 +98,14 @@ class SlipHistory:
 
 
 def constraint_active(
-    lambda_c: Array, normal_gap: Array, c: float, rounding: float = 0.0
+    lambda_c: Array, normal_gap: Array, c: float, rounding_stress: float = 0.0
 ) -> NDArray[np.bool_]:
     """Return where the non-penetration constraint is active, lambda_c - c g_N > 0: shape (n,).
 
-    g_N = gap - u_nu; c is the complementarity parameter (stress/length), and `rounding` a tolerance
-    of lambda_c - c g_N (stress).
+    g_N = gap - u_nu; c is the complementarity parameter (stress/length), and `rounding_stress` a
+    tolerance of lambda_c - c g_N (stress).
     """
-    return np.greater(lambda_c - c * normal_gap, rounding)
+    return np.greater(lambda_c - c * normal_gap, rounding_stress)
 
 
 @dataclass(frozen=True)
@@ -132,15 +132,15 @@ class ActiveSet:
         slip: Array,
         bound: Array,
         c: float,
-        rounding: float = 0.0,
+        rounding_stress: float = 0.0,
     ) -> ActiveSet:
         """Return the states of nodes with friction: |lambda_f + c u_tau| <= s sticks.
 
         lambda_f and u_tau, the slip of the step, have the shape (n, d), the friction bound s has
-        (n,); c and `rounding` are those of `constraint_active`.
+        (n,); c and `rounding_stress` are those of `constraint_active`.
         """
         # At the bound and without slip yet a node sticks, to rounding.
-        allowed = bound * (1 + 100 * EPS) + rounding
+        allowed = bound * (1 + 100 * EPS) + rounding_stress
         within = np.linalg.norm(friction + c * slip, axis=1) <= allowed
         acts = (bound > 0) | closed
         return ActiveSet(closed, within & acts, ~within & acts)

@@ -243,13 +243,13 @@ class _Boundaries:
         sides = np.asarray(self.sides.any(axis=2))
         _, theirs, centres = exchanged(comm, ranks, sides[near], centres[near])
         depth = np.full(len(x), np.inf)
-        rounding = NEGLIGIBLE * self.body.domain.size
+        rounding_length = NEGLIGIBLE * self.body.domain.size
         for i, j in in_balls(centres, points, radius, CHUNK):
             distance, there = _from_facets(opposite, j, x[i])
             behind = np.minimum(opposite.distance_bounds(j, there, opposite.normal[j])[0], 0.0)
             np.minimum.at(depth, i, distance + own[i] + behind - _bow(opposite)[j])
             np.minimum.at(least, i, distance)
-            nearest_ones = distance <= least[i] + rounding
+            nearest_ones = distance <= least[i] + rounding_length
             np.logical_or.at(on_sides, i[nearest_ones], theirs[j[nearest_ones]])
         return depth, on_sides
 

@@ -52,7 +52,7 @@ class PairPlacement:
     nodes: NDArray[np.int64]  #: global numbers of this rank's nodes with a multiplier, (n,)
     added: Array  #: gap at `nodes` beside that between the meshes, shape (n,) (length)
     press: bool  #: whether overlaps in the reference configuration are interferences
-    rounding: float  #: overlap that counts as rounding (length)
+    rounding_length: float  #: overlap that counts as rounding (length)
 
     @property
     def least_added(self) -> float:
@@ -74,7 +74,7 @@ class PairPlacement:
         _, local = owned_among(body.layout.index_map, self.nodes)
         points = body.space.tabulate_dof_coordinates()[local, : body.dim]
         gap, cut = coupling.gap, 0.0
-        if not self.press and coupling.depth <= self.rounding:
+        if not self.press and coupling.depth <= self.rounding_length:
             gap, cut = _touching(body.comm, coupling)
             cut = max(cut - max(self.least_added, 0.0), 0.0)
         unknown = body.comm.allreduce(
@@ -172,9 +172,9 @@ def find_pair(
         )
     _check_apart(body, coupling, slave.owners, label)
     thinner = body.thicknesses[body.components_of(part, against)].min()
-    rounding = float(body.rounded_overlap(thinner))
+    rounding_length = float(body.rounded_overlap(thinner))
     placement = PairPlacement(
-        body, slave, master, reach, no_multiplier, coupling.nodes, added, press, rounding
+        body, slave, master, reach, no_multiplier, coupling.nodes, added, press, rounding_length
     )
     _check_overlap(placement, coupling, overlap, alone, label)
     return placement, placement.geometry(slave, master, coupling)
@@ -191,17 +191,17 @@ def _check_overlap(
 
     `alone`: partly covered facets without a neighbour that faces the master, shape (f,).
     """
-    body, rounding, owners = pair.body, pair.rounding, pair.slave.owners
+    body, rounding_length, owners = pair.body, pair.rounding_length, pair.slave.owners
     least = pair.least_added
     depth, resolved = coupling.interference(owners, pair.added)
     inside, beside = overlap
     depth = max(depth, max(overlap) - max(least, 0.0))
     # Sides that do not face each other see nothing of an overlap, nor of one beside them.
-    resolved &= inside <= 2 * coupling.depth and beside - max(least, 0.0) <= rounding
-    coarse = bool((alone & (coupling.depths > least + rounding)).any())
+    resolved &= inside <= 2 * coupling.depth and beside - max(least, 0.0) <= rounding_length
+    coarse = bool((alone & (coupling.depths > least + rounding_length)).any())
     resolved &= not body.comm.allreduce(coarse, op=MPI.LOR)
-    drawn = max(coupling.depth, *overlap) > rounding
-    if depth <= rounding or (resolved and (pair.press or not drawn)):
+    drawn = max(coupling.depth, *overlap) > rounding_length
+    if depth <= rounding_length or (resolved and (pair.press or not drawn)):
         return
     if drawn and _connected(body, coupling, owners):
         raise InputError(

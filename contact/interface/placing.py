@@ -51,7 +51,7 @@ class Candidates:
     #: Depth of the nodes, shape (n,) (length), in a shape that the curved surface, or the straight
     #: facets, touch, and rounding.
     chord_penetration: Array
-    rounding: float  #: and that counts as rounding (length)
+    rounding_length: float  #: and that counts as rounding (length)
     direction: Array  #: the contact direction, shape (n, d)
     measured: Array  #: the gap from `front`, shape (n,)
     gap: Array  #: from the curve through the corners, shape (n,)
@@ -87,7 +87,7 @@ def find_candidates(
     shape (nodes, d).
     """
     comm, lumped = body.comm, Lumping.of(facets).without_axis(facets)
-    rounding = _rounding(body, part)
+    rounding_length = _rounding_length(body, part)
     # Functions without a mean on Gamma_3 carry nothing: P2 vertices on the axis of revolution.
     size = np.array([lumped.weight.sum(), lumped.weight.size])
     area, count = comm.allreduce(size, op=MPI.SUM)
@@ -122,8 +122,8 @@ def find_candidates(
         facing=np.einsum("ni,ni->n", direction, normal),
         front=front,
         # The contact direction may differ a little from the normal.
-        chord_penetration=rounding + 1.1 * chord_penetration,
-        rounding=rounding,
+        chord_penetration=rounding_length + 1.1 * chord_penetration,
+        rounding_length=rounding_length,
         direction=direction,
         measured=gap,
         gap=curved,
@@ -133,7 +133,7 @@ def find_candidates(
     )
 
 
-def _rounding(body: BodyEquilibrium, part: str) -> float:
+def _rounding_length(body: BodyEquilibrium, part: str) -> float:
     """Return the depth of a part in a shape that counts as rounding (length). Collective."""
     thinnest = body.thicknesses[body.components_of(part)].min()
     return float(body.rounded_overlap(thinnest, BY_HAND))
@@ -173,7 +173,7 @@ class FoundationPlacement:
     def refuse_unresolved(self) -> None:
         """Refuse a shape that cuts facets between their nodes. Collective."""
         try:
-            _refuse_unresolved(self.obstacle, self.facets, _rounding(self.body, self.part))
+            _refuse_unresolved(self.obstacle, self.facets, _rounding_length(self.body, self.part))
         except InputError as error:
             raise error.within(f"{self.key}.") from None
 
@@ -265,7 +265,7 @@ def find_nodes(
             _refuse_within(body.comm, obstacle, candidates)
             if not press:  # an adaptive run starts on facets that hide the shape
                 _refuse_overlap(body, candidates)
-                _refuse_unresolved(obstacle, facets, candidates.rounding)
+                _refuse_unresolved(obstacle, facets, candidates.rounding_length)
         except InputError as error:
             raise error.within(f"{key}.") from None
     else:
@@ -336,7 +336,7 @@ def _refuse_behind(
     best = body.comm.allreduce(np.max(candidates.facing[seen], initial=-np.inf), op=MPI.MAX)
     if np.isfinite(best) and best <= 1e-9:
         # Nodes beside a punch that is within facets see it sideways.
-        _refuse_unresolved(obstacle, facets, candidates.rounding, facing=False)
+        _refuse_unresolved(obstacle, facets, candidates.rounding_length, facing=False)
         raise InputError(
             "foundation: it lies behind the contact part: the contact direction points "
             "into the body at every node; accepted: a normal towards the body, a shape in front "
@@ -350,10 +350,10 @@ def _refuse_within(comm: MPI.Intracomm, obstacle: Obstacle, candidates: Candidat
     # It meets a far side, or nothing, and nodes that touch would seem to be open.
     if not isinstance(obstacle, Shape):
         return
-    rounding, facing = candidates.rounding, candidates.facing > 0
+    rounding_length, facing = candidates.rounding_length, candidates.facing > 0
     with on_all_ranks(comm), naming("foundation"):
-        within = obstacle.distance(candidates.front[facing])[0] < -rounding
-        within &= candidates.measured[facing] > rounding
+        within = obstacle.distance(candidates.front[facing])[0] < -rounding_length
+        within &= candidates.measured[facing] > rounding_length
     count = comm.allreduce(np.count_nonzero(within))
     if count > 0:
         raise InputError(
@@ -373,14 +373,14 @@ def _refuse_overlap(body: BodyEquilibrium, candidates: Candidates) -> None:
     if body.comm.allreduce(bool(np.any(depth > candidates.chord_penetration)), op=MPI.LOR):
         raise InputError(
             f"foundation: the undeformed body cuts it, by up to {cut:.3g}; accepted: gaps "
-            f">= 0 but for {candidates.rounding:.1g} (rounding), and the deviation of "
+            f">= 0 but for {candidates.rounding_length:.1g} (rounding), and the deviation of "
             'facets from a curve, or overlap = "press"',
             "overlap",
         )
 
 
 def _refuse_unresolved(
-    obstacle: Obstacle, facets: Surface, rounding: float, facing: bool = True
+    obstacle: Obstacle, facets: Surface, rounding_length: float, facing: bool = True
 ) -> None:
     """Refuse shapes that cut facets between their nodes, deeper than at these. Collective.
 
@@ -404,7 +404,7 @@ def _refuse_unresolved(
     deepest = depths.max(axis=1)
     depth = comm.allreduce(float(deepest.max(initial=0.0)), op=MPI.MAX)
     missed = (deepest > depth / 2) & (nodes < RESOLVED * depth)
-    if comm.allreduce(bool(missed.any()), op=MPI.LOR) and depth > rounding:
+    if comm.allreduce(bool(missed.any()), op=MPI.LOR) and depth > rounding_length:
         raise InputError(
             f"foundation: it cuts facets of the undeformed body between their nodes, by up to "
             f"{depth:.3g}; accepted: shorter facets there, a shape that is apart or touches",

@@ -85,7 +85,11 @@ class Checkpoints:
     def keep(self, record: StepRecord) -> None:
         """Write the checkpoint of the next step; those behind it, of an earlier run, go first."""
         self._count += 1
-        said = {"row": record.row, "enthalpy": record.enthalpy, "rounding": record.rounding}
+        said = {
+            "row": record.row,
+            "enthalpy": record.enthalpy,
+            "rounding": record.equilibrium_rounding,
+        }
         arrays = _gathered(self._problem, record.state)
         arrays |= self._about | {RECORD: np.array(json.dumps(said))}
 
@@ -143,7 +147,8 @@ def read_steps(folder: str | Path, problem: ContactProblem) -> list[StepRecord]:
     reader, found = _Reader(problem), list[StepRecord]()
     for path in files:
         state, record = reader.read(path)
-        found.append(StepRecord(state, **json.loads(record)))
+        said = json.loads(record)
+        found.append(StepRecord(state, said["row"], said["enthalpy"], said["rounding"]))
     return found
 
 

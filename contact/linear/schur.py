@@ -127,9 +127,9 @@ class SchurComplement:
             pc.getFactorMatrix().setMumpsIcntl(*ORDERING)
             _compat.set_schur_unknowns(pc.getFactorMatrix(), self._numbers)
 
-    def exceeds(self, rhs: Array, rounding: Array) -> bool:
+    def exceeds(self, rhs: Array, rounding_force: Array) -> bool:
         """Tell whether a right-hand side exceeds rounding at eliminated unknowns."""
-        beyond = np.abs(rhs) > rounding
+        beyond = np.abs(rhs) > rounding_force
         beyond[self._retained] = False
         return bool(beyond.any())
 

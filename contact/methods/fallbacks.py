@@ -240,8 +240,8 @@ def _penetrating(
     jump = interface.nodes.jump(state.x)
     depth = np.where(inside, 0.0, -interface.normal_gap(jump))
     deepest = interface.nodes.maximum(depth)
-    rounding = interface.rounding_pressure(jump) / interface.c_0
-    count = int(summed(interface.comm, np.count_nonzero(depth > rounding)))
+    rounding_length = interface.rounding_stress(jump) / interface.c_0
+    count = int(summed(interface.comm, np.count_nonzero(depth > rounding_length)))
     return deepest, count
 
 

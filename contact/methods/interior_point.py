@@ -324,9 +324,7 @@ def interior_point(
         jump = interface.nodes.jump(state.x)
         bound = interface.bound(jump, state.multipliers)
         # With all nodes open the next bound is zero, and the solution the same.
-        if aside is not None and interface.nodes.maximum(bound) <= interface.rounding_pressure(
-            jump
-        ):
+        if aside is not None and interface.nodes.maximum(bound) <= interface.rounding_stress(jump):
             break
         # Pressures in a nonlinear body may be far from the loads, as beyond its limit load.
         pressure = interface.pressure(jump, state.multipliers)
@@ -403,7 +401,7 @@ class InteriorPoint:
             interface = self.problem.interface
             jump = interface.nodes.jump(state.x)
             pressure = interface.nodes.maximum(interface.pressure(jump, state.multipliers))
-            if pressure <= interface.rounding_pressure(jump):
+            if pressure <= interface.rounding_stress(jump):
                 ended = f"nothing presses after {steps} steps"
                 break
             gap = self.relative_gap()

@@ -147,7 +147,7 @@ class UnconstrainedModes:
         interface = problem.interface
         nodes, jump = interface.nodes, interface.nodes.jump(state.x)
         # Pressures that are rounding do not constrain.
-        pressed = interface.pressure(jump, state.multipliers) > interface.rounding_pressure(jump)
+        pressed = interface.pressure(jump, state.multipliers) > interface.rounding_stress(jump)
         motions, columns = [], []
         for group in self.groups:
             free = null_space(group.constraints(self.problem.frictional, pressed))

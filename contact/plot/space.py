@@ -488,8 +488,8 @@ def _show_friction(ax: Axes, front: Any, camera: Camera) -> float:
     size = np.linalg.norm(along, axis=1)
     size[np.any((flat < camera.low) | (flat > camera.high), axis=1)] = 0.0
     # Rounding of the pressures is no friction.
-    rounding = 1e-9 * np.linalg.norm(traction, axis=1).max(initial=0.0)
-    acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding))
+    rounding_stress = 1e-9 * np.linalg.norm(traction, axis=1).max(initial=0.0)
+    acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding_stress))
     if not acting.size:
         return 0.0
     # The first of each cell of a grid of 14 x 14 cells.

@@ -199,9 +199,9 @@ def _differing(
     size = problem.comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX)
     # sin(pi) is 0.
     unit = problem.body.phi_scale if name == "potential" else 1.0
-    rounding = EPS * problem.domain.size
-    differ = np.ptp(values, axis=1) > NEGLIGIBLE * size + unit * rounding
-    points = np.where(np.abs(points) < rounding, 0.0, points)
+    rounding_length = EPS * problem.domain.size
+    differ = np.ptp(values, axis=1) > NEGLIGIBLE * size + unit * rounding_length
+    points = np.where(np.abs(points) < rounding_length, 0.0, points)
     local_row = np.column_stack([values, points])[differ][:1]
     differing = np.concatenate(problem.comm.allgather(local_row)) + 0.0  # no -0
     return differing[0] if differing.size > 0 else None

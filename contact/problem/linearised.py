@@ -288,8 +288,8 @@ class Linearised:
             )
         # Linear convergence, or rounding if two corrections in turn are not smaller: those of
         # multigrid shrink unevenly. The first ones may grow by the smoothed pressure.
-        rounding = now <= WEAK * size and min(taken[-2:]) >= min(taken[:-2], default=np.inf)
-        return rounding or now**2 <= EPS * size * min(last, size)
+        stagnates = now <= WEAK * size and min(taken[-2:]) >= min(taken[:-2], default=np.inf)
+        return stagnates or now**2 <= EPS * size * min(last, size)
 
     def _norm(self, x: Array, f: Array) -> float:
         """Return |x| + EPS |f|."""

@@ -59,7 +59,7 @@ class Residuals:
     friction
         |lambda_f - proj_s(lambda_f + c_r u_tau)| over the same, with the final bound s.
     floors
-        Rounding floors of the three: `force_rounding` up to the `rounding_limit` of the body, and
+        Rounding floors of the three: `rounding_forces` up to the `rounding_limit` of the body, and
         these forces as pressures.
     equilibrium_rounding
         Largest residual of equilibrium that is accepted as rounding; 0 where no force acts.
@@ -152,7 +152,7 @@ def _random_signs(size: int) -> Array:
     return PERTURBATION * np.random.default_rng(0).choice((-1.0, 1.0), size)
 
 
-def force_rounding(
+def rounding_forces(
     problem: AnyProblem, state: State, internal: Array, perturbed: _Perturbed | None = None
 ) -> Array:
     """Return norms of the rounding errors of forces and charges, by component. Collective.
@@ -196,8 +196,8 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
     Multipliers at open nodes, and pressures that are rounding, do not count as contact.
     """
     jump, multiplier = interface.nodes.jump(state.x), state.multipliers.contact
-    rounding = interface.rounding_pressure(jump)
-    on = constraint_active(multiplier, interface.normal_gap(jump), interface.c_0, rounding)
+    rounding_stress = interface.rounding_stress(jump)
+    on = constraint_active(multiplier, interface.normal_gap(jump), interface.c_0, rounding_stress)
     pressed = interface.norms(interface.pressure(jump, state.multipliers) - multiplier * ~on)
     in_contact = (pressed > 0) & (pressed > EPS * pressed.max())
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=in_contact).max())
@@ -225,17 +225,19 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     unbalanced = body.norms(body.unbalanced(residual))
     limit, loaded = body.rounding_limit * scale, loads > 0
     small = ~loaded | (unbalanced <= limit)
-    rounding, contact_rounding = np.zeros_like(scale), np.zeros(interface.components)
+    rounding_force, rounding_on_contact = np.zeros_like(scale), np.zeros(interface.components)
     if small.any():
-        estimate = force_rounding(problem, state, internal, perturbed)
-        rounding = np.where(small, estimate, 0.0)
-        contact_rounding = np.minimum(rounding, limit)[0]
-        loaded |= exerted > rounding
+        estimate = rounding_forces(problem, state, internal, perturbed)
+        rounding_force = np.where(small, estimate, 0.0)
+        rounding_on_contact = np.minimum(rounding_force, limit)[0]
+        loaded |= exerted > rounding_force
         # Without loads on a component all of its forces are rounding, its own or that of others.
-        largest = rounding.max(axis=1, keepdims=True)
-        rounding = np.where(loaded, np.minimum(rounding, limit), largest)
-        vanishes = ~loaded & (unbalanced <= rounding)
-        unbalanced, rounding = (np.where(vanishes, 0.0, norms) for norms in (unbalanced, rounding))
+        largest = rounding_force.max(axis=1, keepdims=True)
+        rounding_force = np.where(loaded, np.minimum(rounding_force, limit), largest)
+        vanishes = ~loaded & (unbalanced <= rounding_force)
+        unbalanced, rounding_force = (
+            np.where(vanishes, 0.0, norms) for norms in (unbalanced, rounding_force)
+        )
         if not loaded.any():
             # Reference of free motions: the residual of the zero initial guess, where supports
             # react that of the component, beside which those of a stiffer one may be large.
@@ -245,12 +247,14 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     # Least reference of a component without loads, and of charges (in the unit of forces).
     scale = np.maximum(scale, EPS * scale.max())
     reference = np.where(scale > 0, scale, 1.0)
-    balance = worst((unbalanced / reference).reshape(1, -1), (rounding / reference).reshape(1, -1))
+    balance = worst(
+        (unbalanced / reference).reshape(1, -1), (rounding_force / reference).reshape(1, -1)
+    )
     jump = interface.nodes.jump(state.x)
     bound = interface.bound(jump, state.multipliers)
-    pressures = _as_pressures(interface, contact_rounding)
+    pressures = _as_pressures(interface, rounding_on_contact)
     laws = interface_residuals(interface, jump, state.multipliers, bound, pressures)
-    accepted = np.where(loaded, np.minimum(rounding, unbalanced) / reference, 0.0)
+    accepted = np.where(loaded, np.minimum(rounding_force, unbalanced) / reference, 0.0)
     equilibrium_rounding = float(accepted.max())
     residuals, floors = (
         (float(first), float(contact), float(friction))

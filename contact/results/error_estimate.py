@@ -151,7 +151,7 @@ def estimated(
     squares += at_contact
     sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
     energies, by_ratio, with_ratio, total, contact = map(float, sums)
-    if energies <= _rounding(problem, state, volume):
+    if energies <= _rounding_energy(problem, state, volume):
         return Estimate(np.zeros_like(squares), 0.0, 0.0, 0.0, None)
     mean_ratio = by_ratio / with_ratio if with_ratio > 0 else None
     return Estimate(squares, contact, energies, total, mean_ratio)
@@ -179,7 +179,7 @@ def _acting_inside(problem: ContactProblem) -> list[str]:
     return [name for name in parts if name in problem.domain.inside]
 
 
-def _rounding(problem: ContactProblem, state: State, volume: float) -> float:
+def _rounding_energy(problem: ContactProblem, state: State, volume: float) -> float:
     """Return the energy of strains that a rigid motion leaves by rounding. Collective."""
     # They are differences of displacements over the size of a cell, in all directions.
     body, comm, topology = problem.body, problem.comm, problem.domain.mesh.topology

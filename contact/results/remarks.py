@@ -212,8 +212,9 @@ def rounding(solution: Results) -> Iterator[Remark]:
     """Warn of forces that are small beside those in the bodies, and hardly known. Collective."""
     problem, state, outcome = solution.problem, solution.state, solution.outcome
     body, asked, larger = problem.body, outcome.allowed.equilibrium, "far larger forces act"
-    if solution.rounding > asked:
-        yield f"rounding decides how well the forces balance, to {solution.rounding:.1e}: {larger}"
+    if solution.equilibrium_rounding > asked:
+        known = f"to {solution.equilibrium_rounding:.1e}"
+        yield f"rounding decides how well the forces balance, {known}: {larger}"
     if not solution.converged:
         return
     residual, loads = residual_forces(problem, state), body.load_norms(state.time)

@@ -62,7 +62,7 @@ class StepRecord:
     state: State
     row: Mapping[str, float]  #: the columns of ``steps.csv``
     enthalpy: float  #: where the energy balance of the next step begins, see `Balance`
-    rounding: float = 0.0  #: largest `equilibrium_rounding` of a step so far
+    equilibrium_rounding: float = 0.0  #: largest `equilibrium_rounding` of a step so far
 
     def __repr__(self) -> str:
         """Return the main columns; `row` has all."""
@@ -79,7 +79,7 @@ class StepRecorder:
             here = problem.at(last.state.time, last.state.history)
             self._before = balance(here, last.state, self._before)
             self._before = replace(self._before, enthalpy=last.enthalpy)
-        self._rounding = 0.0 if last is None else last.rounding
+        self._equilibrium_rounding = 0.0 if last is None else last.equilibrium_rounding
         self._driven = DrivenPart.of(problem)
         self._ways = driven_displacements(problem).values()
 
@@ -93,8 +93,10 @@ class StepRecorder:
             way = np.array([mean(problem, state) for mean in self._ways])
             solution.driven = way, self._driven.force(problem, state)
         row = values_of(STEPS, solution)
-        self._rounding = max(self._rounding, outcome.residuals.equilibrium_rounding)
-        return StepRecord(state, row, energies.enthalpy, self._rounding)
+        self._equilibrium_rounding = max(
+            self._equilibrium_rounding, outcome.residuals.equilibrium_rounding
+        )
+        return StepRecord(state, row, energies.enthalpy, self._equilibrium_rounding)
 
 
 @dataclass(repr=False)
@@ -247,11 +249,11 @@ class Results:
         below 1e-9 of the largest count as rounding, and those that rounding of displacements makes.
         """
         interface, jump = self.problem.interface, self.nodal
-        rounding = interface.negligible(jump, self.pressure)
+        rounding_stress = interface.negligible(jump, self.pressure)
         active = interface.active_set(
-            jump, self.multipliers, self.friction_bound, rounding=rounding
+            jump, self.multipliers, self.friction_bound, rounding_stress=rounding_stress
         )
-        layer = interface.foundation.layer_pressure(jump) > rounding
+        layer = interface.foundation.layer_pressure(jump) > rounding_stress
         touches = active.closed | layer
         sticks = active.sticks & (self.friction_bound > 0)
         return np.where(touches, np.where(sticks, "stick", "slip"), "open")
@@ -262,16 +264,16 @@ class Results:
         return self.outcome.converged
 
     @property
-    def rounding(self) -> float:
+    def equilibrium_rounding(self) -> float:
         """Forces out of balance that count as rounding; of an evolution the most in a step."""
         own = self.outcome.residuals.equilibrium_rounding
-        return max([own, *(step.rounding for step in self.steps[-1:])])
+        return max([own, *(step.equilibrium_rounding for step in self.steps[-1:])])
 
     @property
     def floors(self) -> dict[str, float]:
         """Rounding floors of the residuals."""
         balance, contact, friction = self.outcome.residuals.floors
-        balance = max(balance, self.rounding)
+        balance = max(balance, self.equilibrium_rounding)
         return {"equilibrium": balance, "contact": contact, "friction": friction}
 
     @cached_property

@@ -68,8 +68,8 @@ def uniqueness(
         return np.inf, False
     jump = nodes.jump(state.x)
     pressure = interface.pressure(jump, state.multipliers)
-    rounding = interface.negligible(jump, pressure)
-    closed = constraint_active(pressure, interface.normal_gap(jump), interface.c_0, rounding)
+    rounding_stress = interface.negligible(jump, pressure)
+    closed = constraint_active(pressure, interface.normal_gap(jump), interface.c_0, rounding_stress)
     if nodes.maximum(closed.astype(float)) == 0:
         closed = interface.gap <= EPS * interface.size
     mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(jump))
@@ -78,7 +78,7 @@ def uniqueness(
     if stiffness is None:
         return np.inf, False
     columns, body = [], problem.body
-    balanced = nodes.maximum(pressure) > interface.rounding_pressure(jump)
+    balanced = nodes.maximum(pressure) > interface.rounding_stress(jump)
     external = body.external(state.time)
     for group in groups(problem):
         free = null_space(group.supports)

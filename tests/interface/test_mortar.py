@@ -45,7 +45,7 @@ def loads(side, nodes):
     return total
 
 
-def rounding(*kinds):
+def roundoff(*kinds):
     """Return the rounding of integrals: of inverse bilinear maps they are no polynomials."""
     return 1e-12 if QUADRILATERAL in [shape for shape, _ in kinds] else 3e-15
 
@@ -69,7 +69,7 @@ def test_constant_pressure_and_linear_fields_pass(on, against, turned) -> None:
     check_a_pair(
         flat(on, 5, 1.0, 1.0, 1, turn=turn),
         flat(against, 7, 1.1, -1.0, 2, FIRST, turn),
-        rounding(on, against),
+        roundoff(on, against),
     )
 
 
@@ -200,7 +200,7 @@ def test_nodes_without_a_multiplier_hand_their_functions_over(kind) -> None:
     jump = found.D @ x[found.slaves] - found.M @ y[found.masters - FIRST]
     np.testing.assert_allclose(jump[:, :-1], 0, atol=1e-12)
     forces = found.M.T @ found.weight
-    close = rounding(kind)
+    close = roundoff(kind)
     np.testing.assert_allclose(forces, loads(master, found.masters), rtol=0, atol=close)
 
 

@@ -100,11 +100,11 @@ def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
     assert outcome.converged
     x, multipliers = slow.x, slow.multipliers
     slip = problem.nodes.tangential_component(problem.nodal(slow))
-    rounding = 1e-11 * multipliers.contact.max()
-    is_open = multipliers.contact < 1e3 * rounding
+    rounding_stress = 1e-11 * multipliers.contact.max()
+    is_open = multipliers.contact < 1e3 * rounding_stress
     assert is_open.any()
-    pressure = np.where(is_open, rounding, multipliers.contact)
-    against = np.where(is_open[:, None], -rounding * np.sign(slip), 0.0)
+    pressure = np.where(is_open, rounding_stress, multipliers.contact)
+    against = np.where(is_open[:, None], -rounding_stress * np.sign(slip), 0.0)
     fast = Newton(problem, NewtonOptions(tolerance=1e-9))
     state, outcome = fast.solve(State(x, Multipliers(pressure, multipliers.friction + against)))
     assert outcome.converged

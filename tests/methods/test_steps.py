@@ -116,7 +116,7 @@ def test_methods_agree_at_every_step(law):
         problem = shaken(law).at(one.time, one.history)
         interface, nodal = problem.interface, problem.nodal(one)
         bound = interface.bound(nodal, one.multipliers)
-        active = interface.active_set(nodal, one.multipliers, bound, rounding=1e-9)
+        active = interface.active_set(nodal, one.multipliers, bound, rounding_stress=1e-9)
         kinds |= set(zip(active.closed, active.sticks, active.slips, strict=True))
     assert len(kinds) == 3  # open, sticking and sliding nodes have been met
 

@@ -130,7 +130,7 @@ def test_rounding_is_what_no_solve_gets_rid_of(degree):
     assert found.equilibrium_rounding > 1e-11  # beside loads and reactions
     assert 0 < found.equilibrium <= found.floors[0]
     assert found.significant == 0
-    known = residuals.force_rounding(problem, state, body.internal_forces(state))
+    known = residuals.rounding_forces(problem, state, body.internal_forces(state))
     assert 0.1 < stalled / known[0, 0] < 0.5
     spoilt = state.x.copy()
     spoilt[: body.owned] += 1e-9 * body.free.ravel() * np.abs(spoilt).max()

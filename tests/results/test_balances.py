@@ -97,7 +97,7 @@ def test_the_balance_of_two_bodies_that_are_both_held():
     given["contact"]["gap"] = 0.05
     apart = solve_case(parse_case(given), comm=MPI.COMM_SELF)
     balance = force_balance(apart.problem, apart.state)
-    assert apart.converged and np.abs(balance.supports).max() < balance.rounding
+    assert apart.converged and np.abs(balance.supports).max() < balance.rounding_force
     assert balance.imbalance == 0  # the supports of a body that only moves feel rounding
 
 

@@ -161,7 +161,7 @@ def test_the_summary_has_the_most_that_rounding_was_granted(tmp_path):
     write_outputs(solution, tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert solution.outcome.residuals.equilibrium_rounding == 0
-    assert summary["rounding"]["equilibrium"] == solution.steps[0].rounding > 1e-13
+    assert summary["rounding"]["equilibrium"] == solution.steps[0].equilibrium_rounding > 1e-13
 
 
 @pytest.mark.core
