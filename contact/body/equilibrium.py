@@ -69,7 +69,7 @@ class ComponentNorms:
     ----------
     comm
         Communicator.
-    component, behind
+    connected_component, behind
         The component of each owned node, shape (nodes,), and of each global unknown, shape (m,).
     count
         Number k of components.
@@ -80,7 +80,7 @@ class ComponentNorms:
     """
 
     comm: MPI.Intracomm
-    component: NDArray[np.intp]
+    connected_component: NDArray[np.intp]
     behind: NDArray[np.intp]
     count: int
     block_size: int
@@ -90,13 +90,13 @@ class ComponentNorms:
     @property
     def mechanical(self) -> NDArray[np.bool_]:
         """Mask of displacements, or forces, among owned values with the global ones behind."""
-        nodal = np.tile(np.arange(self.block_size) < self.dim, self.component.size)
+        nodal = np.tile(np.arange(self.block_size) < self.dim, self.connected_component.size)
         return np.concatenate([nodal, self.global_mechanical])
 
     def at(self, nodes: NDArray[np.int32]) -> ComponentNorms:
         """Return the norms of some owned nodes alone."""
         none = np.zeros(0, dtype=np.intp)
-        component = self.component[nodes]
+        component = self.connected_component[nodes]
         return ComponentNorms(
             self.comm, component, none, self.count, self.block_size, self.dim, none.astype(bool)
         )
@@ -104,7 +104,7 @@ class ComponentNorms:
     @property
     def apart(self) -> Subsystems | None:
         """Connected components as uncoupled subsystems; None for one."""
-        of = np.repeat(self.component, self.block_size)
+        of = np.repeat(self.connected_component, self.block_size)
         return (of, self.count) if self.count > 1 else None
 
     def norms(self, values: Array) -> Array:
@@ -122,13 +122,15 @@ class ComponentNorms:
         if self.count == 1:
             square = summed(self.comm, np.dot(nodal, nodal)) + np.dot(on_global, on_global)
             return np.array([np.sqrt(square)])
-        component = np.repeat(self.component, self.block_size)
+        component = np.repeat(self.connected_component, self.block_size)
         squares = component_sums(self.comm, component, nodal**2, self.count)
         return np.sqrt(squares + np.bincount(self.behind, on_global**2, minlength=self.count))
 
     def spread(self, norms: Array) -> Array:
         """Return for each owned value the norm of its kind and component."""
-        component = np.concatenate([np.repeat(self.component, self.block_size), self.behind])
+        component = np.concatenate(
+            [np.repeat(self.connected_component, self.block_size), self.behind]
+        )
         return np.where(self.mechanical, norms[0, component], norms[-1, component])
 
 
@@ -212,9 +214,9 @@ class BodyEquilibrium:
         self.global_unknowns = make_global_unknowns(
             domain, self.space, body, foundations, self.unsupported
         )
-        self.components = connected_components(self.space)
+        self.connected_components = connected_components(self.space)
         self.component_norms = component_norms_of(
-            domain, self.space, self.global_unknowns, self.components
+            domain, self.space, self.global_unknowns, self.connected_components
         )
         self.layout = Layout(
             comm=domain.comm,
@@ -255,9 +257,9 @@ class BodyEquilibrium:
         return self.layout.free
 
     @cached_property
-    def component_of_cells(self) -> NDArray[np.intp]:
+    def connected_component_of_cells(self) -> NDArray[np.intp]:
         """Connected component of each local cell, shape (cells,). Collective."""
-        index_map, (component, _) = self.space.dofmap.index_map, self.components
+        index_map, (component, _) = self.space.dofmap.index_map, self.connected_components
         of_nodes = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.intp)
         of_nodes[: component.size] = component
         return np.asarray(with_ghosts(index_map, of_nodes)[self.space.dofmap.list[:, 0]])
@@ -266,8 +268,8 @@ class BodyEquilibrium:
     def boxes(self) -> tuple[Array, Array]:
         """Lower and upper corners of the connected components, shapes (k, d). Collective."""
         of_cells = geometry_nodes(self.domain)
-        of_nodes = np.repeat(self.component_of_cells[: len(of_cells)], of_cells.shape[1])
-        low = np.full((self.components[1], self.dim), np.inf)
+        of_nodes = np.repeat(self.connected_component_of_cells[: len(of_cells)], of_cells.shape[1])
+        low = np.full((self.connected_components[1], self.dim), np.inf)
         high = -low
         np.minimum.at(low, of_nodes, of_cells.reshape(-1, self.dim))
         np.maximum.at(high, of_nodes, of_cells.reshape(-1, self.dim))
@@ -278,7 +280,7 @@ class BodyEquilibrium:
     @property
     def extents(self) -> Array:
         """Largest extents of the connected components, shape (k,) (length). Collective."""
-        if self.components[1] == 1:
+        if self.connected_components[1] == 1:
             return np.array([self.domain.size])
         low, high = self.boxes
         return np.asarray((high - low).max(axis=1))
@@ -289,7 +291,11 @@ class BodyEquilibrium:
 
         Collective.
         """
-        domain, of_cells, count = self.domain, self.component_of_cells, self.components[1]
+        domain, of_cells, count = (
+            self.domain,
+            self.connected_component_of_cells,
+            self.connected_components[1],
+        )
         volume, facets = volumes(domain), exterior_facets(domain.mesh)
         behind = of_cells[cells_at(domain.mesh, facets)[0]]
         thickness = 2 * component_sums(self.comm, of_cells[: volume.size], volume, count)
@@ -315,9 +321,9 @@ class BodyEquilibrium:
         known = np.minimum(positions, POSITIONS_KNOWN * thickness)
         return np.maximum(by_hand * TOUCHING * thickness, known)
 
-    def components_of(self, *parts: str) -> NDArray[np.bool_]:
+    def connected_components_of(self, *parts: str) -> NDArray[np.bool_]:
         """Return which connected components have facets of boundary parts, (k,). Collective."""
-        component, count = self.components
+        component, count = self.connected_components
         met = np.zeros(count, dtype=bool)
         for part in parts:
             facets = self.domain.facets_anywhere(part)

@@ -295,14 +295,14 @@ def _anywhere(domain: Domain, flags: NDArray[np.bool_]) -> bool:
 
 
 @dataclass(frozen=True)
-class Pieces:
+class CutComponents:
     """The connected components between cuts of free shortenings, and the nodes at these cuts.
 
     Attributes
     ----------
     places
         Columns of these shortenings in q, shape (k,).
-    component, count
+    connected_component, count
         The component of each owned node, at a cut that below it, and the number of components.
     points
         Nodes of this rank at the cuts, once for each component above, shape (n, d).
@@ -313,7 +313,7 @@ class Pieces:
     """
 
     places: list[int]
-    component: Indices
+    connected_component: Indices
     count: int
     points: Array
     below: Indices
@@ -362,7 +362,7 @@ class Cuts:
         return Cuts(domain, space, places, body) if places else None
 
     @cached_property
-    def pieces(self) -> Pieces | None:
+    def connected_components(self) -> CutComponents | None:
         """The components between cuts under given forces; None without any. Collective.
 
         A node at a cut stands for two, of which one moves with the cells above.
@@ -380,9 +380,9 @@ class Cuts:
         keys = np.column_stack([index_map.local_to_global(nodes), moved])
         labels, count = distributed_components(space, cells, keys)
         normals = np.stack([self._ends[k][1] for k in self._free], axis=1)
-        return Pieces(
+        return CutComponents(
             places=[self.places[k] for k in self._free],
-            component=labels[: index_map.size_local],
+            connected_component=labels[: index_map.size_local],
             count=count,
             points=space.tabulate_dof_coordinates()[nodes, : len(normals)],
             below=labels[nodes],

@@ -69,7 +69,7 @@ class Interface:
         Largest extent of the body (length).
     elongation
         Depth over width, >= 1, of the cells behind Gamma_3 (`contact.mesh.entities.elongation`).
-    component, components
+    connected_component, connected_components
         Connected component of each contact node, shape (n,), and their number
         (`contact.body.equilibrium`).
     proximal
@@ -85,8 +85,8 @@ class Interface:
     stiffness: Array
     size: float
     elongation: float
-    component: NDArray[np.intp]
-    components: int
+    connected_component: NDArray[np.intp]
+    connected_components: int
     proximal: Proximal | None = None
 
     @property
@@ -121,26 +121,31 @@ class Interface:
 
     def norms(self, values: Array) -> Array:
         """Return the norms in L2(Gamma_3) of values on each component, shape (k,). Collective."""
-        if self.components == 1:
+        if self.connected_components == 1:
             return np.array([self.nodes.norm(values)])
         squares = values**2 if values.ndim == 1 else np.einsum("ni,ni->n", values, values)
         return np.sqrt(
-            component_sums(self.comm, self.component, self.nodes.weight * squares, self.components)
+            component_sums(
+                self.comm,
+                self.connected_component,
+                self.nodes.weight * squares,
+                self.connected_components,
+            )
         )
 
     def component_norms(self, values: Array) -> Array:
         """Return the norms on the components of the nodes, 1 for a single one. Collective."""
         norms = self.norms(values)
-        if self.components == 1 or not norms.max() > 0:
+        if self.connected_components == 1 or not norms.max() > 0:
             return np.ones_like(self.nodes.weight)
-        return np.maximum(norms, EPS * norms.max())[self.component]
+        return np.maximum(norms, EPS * norms.max())[self.connected_component]
 
     @property
     def extents(self) -> tuple[Array, Array]:
         """The number of contact nodes of each component, and their area, shape (k,). Collective."""
-        of, weight = (self.comm, self.component), self.nodes.weight
-        count = component_sums(*of, np.ones_like(weight), self.components)
-        return count, component_sums(*of, weight, self.components)
+        of, weight = (self.comm, self.connected_component), self.nodes.weight
+        count = component_sums(*of, np.ones_like(weight), self.connected_components)
+        return count, component_sums(*of, weight, self.connected_components)
 
     def normal_gap(self, jump: Array) -> Array:
         """Return g_N = gap - u_nu, shape (n,)."""

@@ -52,13 +52,13 @@ def overlap_depths(
     pair: at its sides, but where another pair presses, and where there is no side of any pair. The
     second has the depths above rounding of bodies that no pair keeps apart.
     """
-    if body.components[1] == 1:
+    if body.connected_components[1] == 1:
         return [(0.0, 0.0)] * len(pairs), {}
     bodies = _Boundaries.of(body, [pair[:2] for pair in pairs])
     number, other = bodies.inside(*bodies.points)
     facet, place = np.divmod(number, len(bodies.places))
     depth, on_sides = bodies.depths(facet, place, other)
-    own = bodies.component[facet]
+    own = bodies.connected_component[facet]
     twins = bodies.twins()
     own, other, depth = (np.append(a, b) for a, b in zip((own, other, depth), twins, strict=True))
     on_sides = np.pad(on_sides, ((0, len(own) - len(on_sides)), (0, 0)))
@@ -89,7 +89,7 @@ class _Boundaries:
     body: BodyEquilibrium
     facets: NDArray[np.int32]  #: owned, of the boundary without the axis of revolution, (f,)
     surface: Surface  #: of these facets
-    component: Numbers  #: of each facet, shape (f,)
+    connected_component: Numbers  #: of each facet, shape (f,)
     parts: Sequence[tuple[str, str]]  #: both parts of each pair
     sides: NDArray[np.bool_]  #: which facets are on either part, shape (f, pairs, 2)
     bodies: NDArray[np.bool_]  #: which components each side is of, shape (pairs, 2, components)
@@ -97,14 +97,14 @@ class _Boundaries:
     @staticmethod
     def of(body: BodyEquilibrium, parts: Sequence[tuple[str, str]]) -> _Boundaries:
         """Find them. Collective."""
-        domain, (_, count) = body.domain, body.components
+        domain, (_, count) = body.domain, body.connected_components
         facets = exterior_facets(domain.mesh)
         surface = straight_surface(domain, body.space, facets)
         if domain.revolved:
             radius = surface.corners[:, :, 0].max(axis=1, initial=0.0)
             facets = facets[radius > NEGLIGIBLE * domain.size]
             surface = straight_surface(domain, body.space, facets)
-        component = body.component_of_cells[cells_at(domain.mesh, facets)[0]]
+        component = body.connected_component_of_cells[cells_at(domain.mesh, facets)[0]]
         sides = np.zeros((facets.size, len(parts), 2), dtype=bool)
         bodies = np.zeros((len(parts), 2, count), dtype=bool)
         for pair, both in enumerate(parts):
@@ -142,7 +142,7 @@ class _Boundaries:
         """The `places` of all facets, shape (f k, d), and their components."""
         surface, places, d = self.surface, self.places, self.body.dim
         x = surface.shape.lagrange(surface.order, places) @ surface.points
-        return x.reshape(-1, d), np.repeat(self.component, len(places))
+        return x.reshape(-1, d), np.repeat(self.connected_component, len(places))
 
     def twins(self) -> tuple[Numbers, Numbers, Array]:
         """Return bodies that coincide, the other ones, and the depths of both. Collective."""
@@ -155,7 +155,7 @@ class _Boundaries:
             none = np.zeros(0, dtype=np.intp)
             return none, none, np.zeros(0)
         x = geometry_nodes(self.body.domain).mean(axis=1)
-        of_cells = self.body.component_of_cells[: len(x)]
+        of_cells = self.body.connected_component_of_cells[: len(x)]
         cells = np.flatnonzero(alike[of_cells])
         comm, far = self.body.comm, ASIDE * self.body.domain.size
         x, of = x[cells], of_cells[cells]
@@ -190,7 +190,7 @@ class _Boundaries:
             found = geometry.compute_collisions_points(tree, padded)
             point = np.repeat(np.arange(len(there)), np.diff(found.offsets))
             cell = found.array.astype(np.intp)
-        component = self.body.component_of_cells
+        component = self.body.connected_component_of_cells
         apart = component[cell] != of[point]
         point, cell = point[apart], cell[apart]
         of_cells = shape_of(mesh)
@@ -226,9 +226,9 @@ class _Boundaries:
         functions = surface.shape.lagrange(surface.order, at)
         x = np.einsum("nk,nkd->nd", functions, surface.points[facet])
         points = np.column_stack([x, far * other])
-        beside = np.repeat(far * self.component, surface.points.shape[1])
+        beside = np.repeat(far * self.connected_component, surface.points.shape[1])
         nodes = np.column_stack([surface.points.reshape(-1, x.shape[1]), beside])
-        centres = np.column_stack([surface.centres, far * self.component])
+        centres = np.column_stack([surface.centres, far * self.connected_component])
         least = nearest(comm, points, nodes)
         if comm.allreduce(len(x)) == 0:
             return least, np.zeros((0, len(self.parts)), dtype=bool)

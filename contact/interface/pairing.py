@@ -171,7 +171,7 @@ def find_pair(
             "pair",
         )
     _check_apart(body, coupling, slave.owners, label)
-    thinner = body.thicknesses[body.components_of(part, against)].min()
+    thinner = body.thicknesses[body.connected_components_of(part, against)].min()
     rounding_length = float(body.rounded_overlap(thinner))
     placement = PairPlacement(
         body, slave, master, reach, no_multiplier, coupling.nodes, added, press, rounding_length
@@ -356,7 +356,7 @@ def _overlap(
 
 def _connected(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> bool:
     """Return whether both sides are on one connected component. Collective."""
-    component, count = body.components
+    component, count = body.connected_components
     touched = np.zeros((2, count), dtype=np.intc)
     for k, nodes in enumerate((coupling.slaves, coupling.masters)):
         touched[k, component[owners.requested(nodes) - owners.begin]] = 1

@@ -135,7 +135,7 @@ def find_candidates(
 
 def _rounding_length(body: BodyEquilibrium, part: str) -> float:
     """Return the depth of a part in a shape that counts as rounding (length). Collective."""
-    thinnest = body.thicknesses[body.components_of(part)].min()
+    thinnest = body.thicknesses[body.connected_components_of(part)].min()
     return float(body.rounded_overlap(thinnest, BY_HAND))
 
 

@@ -192,9 +192,9 @@ def paths(edges: npt.NDArray[np.integer[Any]], count: int) -> list[npt.NDArray[n
     """Return the polylines of edges, (m, 2), each from its end, or vertex, of smallest number."""
     graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=(count, count)).tocsr()
     graph = graph + graph.T
-    pieces, piece = csgraph.connected_components(graph, directed=False)
-    first = np.lexsort((np.arange(count), np.diff(graph.indptr) > 1, piece))
-    starts = first[np.searchsorted(piece[first], np.arange(pieces))]
+    number, component = csgraph.connected_components(graph, directed=False)
+    first = np.lexsort((np.arange(count), np.diff(graph.indptr) > 1, component))
+    starts = first[np.searchsorted(component[first], np.arange(number))]
     return [
         csgraph.depth_first_order(graph, start, directed=False, return_predecessors=False)
         for start in np.sort(starts)

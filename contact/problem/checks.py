@@ -262,10 +262,12 @@ def _unconstrained(group: Group, unconstrained: Array) -> str:
     """Return the message on unconstrained modes."""
     about, motions = "", unconstrained
     if group.count > 1:
-        moves = np.linalg.norm(group.of_components(unconstrained), axis=2).max(axis=1) > 1e-6
+        moves = (
+            np.linalg.norm(group.by_connected_component(unconstrained), axis=2).max(axis=1) > 1e-6
+        )
         about = f" about {places(group.centres[moves])}"
     if group.cut:  # shortenings only follow
-        motions = linalg.orth(np.concatenate(group.of_components(unconstrained)))
+        motions = linalg.orth(np.concatenate(group.by_connected_component(unconstrained)))
     modes = mode_names(motions, group.names[: len(motions)])
     return (
         f"the body{about} is not constrained: it can move as a rigid body ({modes}); accepted: "
@@ -288,7 +290,7 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     if not problem.piezoelectric:
         return
     body, interface = problem.body, problem.interface
-    component, count = body.components
+    component, count = body.connected_components
     # Constants that may be added to the potential: of each component, and of each electrode.
     raised = np.zeros((*body.free.shape, count))
     raised[np.arange(component.size), -1, component] = 1.0

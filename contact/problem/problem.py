@@ -290,7 +290,9 @@ class ContactProblem:
         body, geometries = self.body, self.geometries
         nodes = joined_nodes(geometries, [contact.on for contact in self.contacts], body)
         young, extents = max(self.contact_youngs), body.extents
-        sizes = np.array([extents[body.components_of(*both)].min() for both in self.sides])
+        sizes = np.array(
+            [extents[body.connected_components_of(*both)].min() for both in self.sides]
+        )
         conductors = [contact.conductor for contact in self.contacts]
         law = FoundationLaw(
             nodes=nodes,
@@ -313,8 +315,8 @@ class ContactProblem:
             stiffness=young / sizes[self.entry_numbers],
             size=self.domain.size,
             elongation=max(elongation(self.domain.mesh, part) for part in facets),
-            component=body.component_norms.component[nodes.nodes],
-            components=body.component_norms.count,
+            connected_component=body.component_norms.connected_component[nodes.nodes],
+            connected_components=body.component_norms.count,
         )
 
     def _check_cuts(self) -> None:

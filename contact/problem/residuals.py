@@ -225,7 +225,10 @@ def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     unbalanced = body.norms(body.unbalanced(residual))
     limit, loaded = body.rounding_limit * scale, loads > 0
     small = ~loaded | (unbalanced <= limit)
-    rounding_force, rounding_on_contact = np.zeros_like(scale), np.zeros(interface.components)
+    rounding_force, rounding_on_contact = (
+        np.zeros_like(scale),
+        np.zeros(interface.connected_components),
+    )
     if small.any():
         estimate = rounding_forces(problem, state, internal, perturbed)
         rounding_force = np.where(small, estimate, 0.0)

@@ -30,7 +30,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.global_unknowns import Pieces
+from contact.body.global_unknowns import CutComponents
 from contact.interface.nodes import unit_vectors
 from contact.model.body import Bolt
 from contact.model.rigid import Motion, rigid_motions
@@ -54,10 +54,10 @@ class Group:
     ----------
     problem
         The problem.
-    component, count
-        Component of each owned node, and number of components of the mesh.
-    components
-        Components of the group.
+    connected_component, count
+        Connected component of each owned node, and their number in the mesh.
+    connected_components
+        Those of the group.
     moved
         The modes in owned and global unknowns, shape (owned + global, m).
     names, axes, centres
@@ -70,9 +70,9 @@ class Group:
     """
 
     problem: ContactProblem
-    component: NDArray[np.int32]
+    connected_component: NDArray[np.int32]
     count: int
-    components: list[int]
+    connected_components: list[int]
     moved: Array
     names: list[str]
     axes: NDArray[np.intp]
@@ -83,13 +83,13 @@ class Group:
     @property
     def inside(self) -> NDArray[np.bool_]:
         """Which owned nodes belong to the group."""
-        return np.isin(self.component, self.components)
+        return np.isin(self.connected_component, self.connected_components)
 
-    def of_components(self, motions: Array) -> Array:
+    def by_connected_component(self, motions: Array) -> Array:
         """Return motions, shape (m, k), by components: (components, 1 to 6, k)."""
         each = 1 if self.problem.domain.revolved else 3 * (self.problem.dim - 1)
-        body_motions = motions[: each * len(self.components)]
-        return body_motions.reshape(len(self.components), each, motions.shape[1])
+        body_motions = motions[: each * len(self.connected_components)]
+        return body_motions.reshape(len(self.connected_components), each, motions.shape[1])
 
     def translation(self, motion: Array) -> float | None:
         """Return the amount of a motion (m,) that moves parts alike along one axis; else None."""
@@ -126,9 +126,9 @@ class Group:
 
 def groups(problem: ContactProblem) -> Iterator[Group]:
     """Yield the groups of a problem: single components, and one of all joined ones. Collective."""
-    pieces = _pieces(problem)
-    whole = problem.body.components
-    component, count = whole if pieces is None else (pieces.component, pieces.count)
+    at_bolts = _cut_components(problem)
+    whole = problem.body.connected_components
+    component, count = whole if at_bolts is None else (at_bolts.connected_component, at_bolts.count)
     joined = _joined(problem, component, count)
     for k in map(int, np.flatnonzero(~joined)):
         yield _group(problem, component, [k], count)
@@ -159,17 +159,17 @@ def _free_motions(problem: ContactProblem) -> dict[int, tuple[str, int]]:
     }
 
 
-def _pieces(problem: ContactProblem) -> Pieces | None:
+def _cut_components(problem: ContactProblem) -> CutComponents | None:
     """Return the components between cuts under given forces; None without cuts. Collective."""
     cuts = problem.body.cuts
-    return None if cuts is None else cuts.pieces
+    return None if cuts is None else cuts.connected_components
 
 
 def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
     """Tell which components a free motion, contact or a cut joins, shape (count,). Collective."""
     free, nodes = [*_free_motions(problem)], problem.nodes
     tied_motion = problem.body.global_unknowns.tied_motion
-    pieces = _pieces(problem)
+    at_bolts = _cut_components(problem)
     touched = np.zeros(count, dtype=np.intc)
     if free and nodes.motion is not None:
         moves = np.abs(nodes.motion[:, :, free]).max(axis=(1, 2), initial=0.0) > 0
@@ -178,8 +178,8 @@ def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -
         touched[component[rows // problem.body.block_size]] = 1
     if nodes.coupling is not None and nodes.coupling.between:
         touched[component[nodes.coupling.local]] = 1
-    if pieces is not None:
-        touched[pieces.below] = touched[pieces.above] = 1
+    if at_bolts is not None:
+        touched[at_bolts.below] = touched[at_bolts.above] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
     return touched > 0
 
@@ -187,7 +187,7 @@ def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -
 def _group(
     problem: ContactProblem,
     component: NDArray[np.int32],
-    components: list[int],
+    connected_components: list[int],
     count: int,
     moving: Mapping[int, tuple[str, int]] = MappingProxyType({}),
 ) -> Group:
@@ -200,18 +200,20 @@ def _group(
     contact = problem.nodes
     weight = contact.sum(np.ones_like(contact.weight))
     centres, centre = [], np.array([contact.sum(x) for x in contact.points.T]) / weight
-    pieces = _pieces(problem) if moving else None
+    at_bolts = _cut_components(problem) if moving else None
     rigid_names, rigid_axes = NAMES[d], [*range(d), *[-1] * (len(NAMES[d]) - d)]
     if problem.domain.revolved:
         rigid_names, rigid_axes = rigid_names[1:2], rigid_axes[1:2]
-    many = len(rigid_names) * len(components) + len(moving)
+    many = len(rigid_names) * len(connected_components) + len(moving)
     moved = np.zeros((body.owned + global_unknowns.size, many))
     motions = moved[: body.owned].reshape(*body.free.shape, many)
-    at_cuts = np.zeros((0, d)) if pieces is None else pieces.points
+    at_cuts = np.zeros((0, d)) if at_bolts is None else at_bolts.points
     joints = np.zeros((len(at_cuts), d, many))
-    for k in components:
+    for k in connected_components:
         inside, size = component == k, problem.domain.size
-        side = np.zeros(0) if pieces is None else (pieces.above == k) * 1.0 - (pieces.below == k)
+        side = (
+            np.zeros(0) if at_bolts is None else (at_bolts.above == k) * 1.0 - (at_bolts.below == k)
+        )
         if count > 1:
             centre, size = middle(problem, np.concatenate([points[inside], at_cuts[side != 0]]))
         columns = slice(len(names), len(names) + len(rigid_names))
@@ -224,22 +226,22 @@ def _group(
         axes += rigid_axes
     for k, (name, axis) in moving.items():
         moved[body.owned + k, len(names)] = 1.0
-        if pieces is not None and k in pieces.places:
-            joints[:, :, len(names)] = pieces.normals[:, :, pieces.places.index(k)]
+        if at_bolts is not None and k in at_bolts.places:
+            joints[:, :, len(names)] = at_bolts.normals[:, :, at_bolts.places.index(k)]
         names.append(name)
         axes.append(axis)
     supports = _gram(problem, _at_supports(problem, moved))
     return Group(
         problem=problem,
-        component=component,
+        connected_component=component,
         count=count,
-        components=components,
+        connected_components=connected_components,
         moved=moved,
         names=names,
         axes=np.array(axes),
         centres=np.array(centres),
         supports=supports + _elastic_gram(problem, moved) + _gram(problem, joints),
-        cut=pieces is not None,
+        cut=at_bolts is not None,
     )
 
 

@@ -116,7 +116,7 @@ def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
 
 def apart(problem: ContactProblem) -> Iterator[Remark]:
     """Warn of connected components of the mesh that no contact keeps apart. Collective."""
-    piece, count = problem.body.components
+    component, count = problem.body.connected_components
     if count == 1:
         return
     met = np.zeros(count, dtype=np.intc)
@@ -124,7 +124,7 @@ def apart(problem: ContactProblem) -> Iterator[Remark]:
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
         if contact.against is not None and geometry.jumps is not None:
             both = np.concatenate([geometry.jumps.slaves, geometry.jumps.masters])
-            met[piece[owners.requested(both) - owners.begin]] = 1
+            met[component[owners.requested(both) - owners.begin]] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.MAX)
     alone = count - int(np.count_nonzero(met))
     if alone:
@@ -139,12 +139,12 @@ def overlapping(problem: ContactProblem) -> Iterator[Remark]:
     found = problem.unpaired
     if not found:
         return
-    piece, points = problem.body.components[0], problem.body.layout.points
+    component, points = problem.body.connected_components[0], problem.body.layout.points
 
     def named(two: tuple[int, int]) -> list[str]:
-        names = [", ".join(_regions(problem, piece, [one])) for one in two]
+        names = [", ".join(_regions(problem, component, [one])) for one in two]
         if names[0] == names[1]:
-            centres = [middle(problem, points[piece == one])[0] for one in two]
+            centres = [middle(problem, points[component == one])[0] for one in two]
             names = [f"the body about {places(centre[None])}" for centre in centres]
         return sorted(names)
 
@@ -201,9 +201,9 @@ def _named(group: Group, motions: Array) -> str:
     problem, names = group.problem, group.problem.domain.regions
     if group.count == 1 or len(names) == 1:
         return "the body"
-    amounts = np.linalg.norm(group.of_components(motions), axis=(1, 2))
-    moved = np.array(group.components)[amounts >= amounts.max() / 2]
-    return ", ".join(_regions(problem, group.component, moved))
+    amounts = np.linalg.norm(group.by_connected_component(motions), axis=(1, 2))
+    moved = np.array(group.connected_components)[amounts >= amounts.max() / 2]
+    return ", ".join(_regions(problem, group.connected_component, moved))
 
 
 def _regions(problem: ContactProblem, component: NDArray[np.int32], among: ArrayLike) -> list[str]:

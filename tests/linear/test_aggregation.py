@@ -214,8 +214,8 @@ def vector(values):
 
 
 @pytest.mark.parametrize("wrong", [-1.0, 0.0, 5.0])
-def test_each_piece_takes_the_corrections_that_help_it(wrong):
-    """A correction that helped one piece was taken as a whole, whatever it did to another."""
+def test_each_connected_component_takes_the_corrections_that_help_it(wrong):
+    """A correction that helped one was taken as a whole, whatever it did to another."""
     matrix = PETSc.Mat().createAIJ((4, 4), nnz=1, comm=MPI.COMM_SELF)
     matrix.setDiagonal(vector(SIZE))
     matrix.assemble()

@@ -1,7 +1,7 @@
 """Domains: named parts of generated meshes, of dolfinx meshes, and of refined ones.
 
 Regions of cells, and refinement, which hands down regions and parts.
-Meshes that fall apart: every piece has to be constrained.
+Meshes that fall apart: every connected component has to be constrained.
 """
 
 from pathlib import Path

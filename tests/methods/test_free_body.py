@@ -53,9 +53,12 @@ def test_the_least_of_all_places():
         back = body.updated(elsewhere.x, -found.motion)
         np.testing.assert_allclose(nodes.jump(back), nodes.jump(state.x), rtol=0, atol=1e-9)
     # Relative to the lid that were half of its way.
-    lifted = body.nodal(state.x)[: group.component.size]
+    lifted = body.nodal(state.x)[: group.connected_component.size]
     assert (
-        nodes.comm.allreduce(np.abs(lifted[group.component == ring]).max(initial=0), MPI.MAX) < 1e-9
+        nodes.comm.allreduce(
+            np.abs(lifted[group.connected_component == ring]).max(initial=0), MPI.MAX
+        )
+        < 1e-9
     )
 
 

@@ -241,7 +241,7 @@ def test_no_friction_is_solved_like_none(law):
     # differ by 5e-6, and pressures, which are up to 27, by 1e-6 with it; by elastic strains less.
     assert np.allclose(state.multipliers.contact, found.multipliers.contact, rtol=0, atol=1e-5)
     body = method.problem.body
-    points, component = body.layout.points, body.components[0]
+    points, component = body.layout.points, body.connected_components[0]
     upper = component == component[points[:, 1].argmax()]
     rigid = rigid_motions(points[upper]).reshape(-1, 3)
     moved = (body.nodal(state.x) - body.nodal(found.x))[upper].ravel()

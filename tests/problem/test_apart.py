@@ -177,8 +177,8 @@ def test_what_moves_freely_joins_bodies(given):
     problem = pressed(blocks(MPI.COMM_SELF), 0.0, 0.0, mu=0.0, rigid=motion)
     shares = problem.body.component_norms
     assert shares.count == (3 if given else 1)
-    assert len(set(shares.component)) == (2 if given else 1)
-    assert set(shares.behind) == {*range(shares.count)} - {*shares.component} or not given
+    assert len(set(shares.connected_component)) == (2 if given else 1)
+    assert set(shares.behind) == {*range(shares.count)} - {*shares.connected_component} or not given
 
 
 @pytest.mark.parallel
