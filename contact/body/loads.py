@@ -167,9 +167,9 @@ def wrong_load(loads: Sequence[Load], domain: Domain, time: float) -> str:
     """Return the key of the first load whose integral is not finite, or too large. Collective."""
     x = ufl.SpatialCoordinate(domain.mesh)
     for i, load in enumerate(loads):
-        measure = domain.dx if load.on is None else domain.ds(load.on)
+        dx = domain.dx if load.on is None else domain.ds(load.on)
         for name, field in load.named.items():
-            form = compiled(expression(domain, field, x, time, f"load.{i}.{name}") * measure)
+            form = compiled(expression(domain, field, x, time, f"load.{i}.{name}") * dx)
             if not abs(summed(domain.comm, fem.assemble_scalar(form))) <= HUGE:
                 return f"load.{i}.{name}"
     return "load"

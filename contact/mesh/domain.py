@@ -97,16 +97,16 @@ def known_name(kind: str, name: str, names: Mapping[str, Indices]) -> str:
 class ExtendedMeasure:
     """A measure of UFL over a half plane, times the extent of the body there."""
 
-    measure: ufl.Measure  #: dx or ds of the mesh
+    ufl_measure: ufl.Measure  #: dx or ds of the mesh
     extent: Expr  #: 2 pi r, the length of the ring through a point
 
     def __call__(self, *arguments: Any, **settings: Any) -> ExtendedMeasure:
         """Return the measure with a subdomain or metadata of its own."""
-        return ExtendedMeasure(self.measure(*arguments, **settings), self.extent)
+        return ExtendedMeasure(self.ufl_measure(*arguments, **settings), self.extent)
 
     def __rmul__(self, integrand: Any) -> ufl.Form:
         """Return the integral over the whole body."""
-        return (self.extent * integrand) * self.measure
+        return (self.extent * integrand) * self.ufl_measure
 
 
 #: Measure of a body or of a part of its boundary.
@@ -348,9 +348,9 @@ class Domain:
         """Measure over all cells."""
         return self._extended(ufl.Measure("dx", domain=self.mesh, subdomain_data=self._cell_data))
 
-    def _extended(self, measure: ufl.Measure) -> Measure:
+    def _extended(self, ufl_measure: ufl.Measure) -> Measure:
         extent = self.kinematics.extent(ufl.SpatialCoordinate(self.mesh))
-        return measure if extent is None else ExtendedMeasure(measure, extent)
+        return ufl_measure if extent is None else ExtendedMeasure(ufl_measure, extent)
 
     def resultant(self, vector: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return a resultant force, shape (..., d), without the radial one of a full turn: 0."""

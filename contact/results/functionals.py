@@ -73,8 +73,8 @@ class Integral:
 
     def _form(self, problem: ContactProblem, at: fem.Function) -> ufl.Form:
         domain = problem.domain
-        measure = domain.dx if self.on is None else domain.ds(self.on)
-        return self.density(*problem.body.split(at)) * measure
+        dx = domain.dx if self.on is None else domain.ds(self.on)
+        return self.density(*problem.body.split(at)) * dx
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""

@@ -66,7 +66,7 @@ def solve(dimension: int, n: int) -> int:
     return int(matrix.getSize()[0])
 
 
-def measure(dimension: int, n: int) -> dict[str, Any]:
+def costs(dimension: int, n: int) -> dict[str, Any]:
     """Measure a solve, after one on a small mesh."""
     solve(dimension, 4)
     libraries = memory()
@@ -80,6 +80,6 @@ def measure(dimension: int, n: int) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    found = measure(int(sys.argv[1]), int(sys.argv[2]))
+    found = costs(int(sys.argv[1]), int(sys.argv[2]))
     if COMM.rank == 0:
         print(json.dumps(found))

@@ -49,7 +49,7 @@ def profiled(action: Callable[[], Result]) -> tuple[Result, float, dict[str, tup
     return result, stats.total_tt, found
 
 
-def measure(dimension: int, n: int, start: str = "") -> dict[str, Any]:
+def costs(dimension: int, n: int, start: str = "") -> dict[str, Any]:
     """Measure a nonlinear solve and one linear solve."""
     case = problem_case(dimension, n)
     solve(build_problem(problem_case(dimension, 4)), case.solver)  # compiles the forms
@@ -71,7 +71,7 @@ def measure(dimension: int, n: int, start: str = "") -> dict[str, Any]:
 def main() -> None:
     """Print the measurements."""
     dimension, n, *start = sys.argv[1:]
-    print(json.dumps(measure(int(dimension), int(n), *start)))
+    print(json.dumps(costs(int(dimension), int(n), *start)))
 
 
 if __name__ == "__main__":

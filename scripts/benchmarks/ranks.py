@@ -35,7 +35,7 @@ def told(event: str) -> dict[str, float]:
     }
 
 
-def measure(dimension: int, n: int) -> dict[str, Any]:
+def costs(dimension: int, n: int) -> dict[str, Any]:
     """Measure a nonlinear solve."""
     PETSc.Log.begin()
     # Multigrid also on meshes that a direct solver would take less time for: they are the samples.
@@ -69,6 +69,6 @@ def measure(dimension: int, n: int) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    found = measure(int(sys.argv[1]), int(sys.argv[2]))
+    found = costs(int(sys.argv[1]), int(sys.argv[2]))
     if COMM.rank == 0:
         print(json.dumps(found))

@@ -84,8 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     made = parser(__doc__, "scale")
     made.add_argument("table", choices=TABLES)
     given = made.parse_args(arguments)
-    measure, caption = TABLES[given.table]
-    Report(given.out).table(f"scale-{given.table}", caption, measure(given.coarse))
+    rows_of, caption = TABLES[given.table]
+    Report(given.out).table(f"scale-{given.table}", caption, rows_of(given.coarse))
 
 
 if __name__ == "__main__":

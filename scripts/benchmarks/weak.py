@@ -163,7 +163,7 @@ def outputs(problem: ContactProblem, n: int, bodies: int) -> dict[str, Callable[
     }
 
 
-def measure(comm: MPI.Intracomm, n: int, bodies: int) -> dict[str, Any]:
+def costs(comm: MPI.Intracomm, n: int, bodies: int) -> dict[str, Any]:
     """Return the counts: the most of any rank, but for bytes received, the sum. Collective."""
     whole = Domain.comm
     Domain.comm = property(lambda domain: Counted(whole.fget(domain)))
@@ -242,7 +242,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if given.solve:
         found = timed(MPI.COMM_WORLD, given.n, given.bodies, given.length)
     else:
-        found = measure(MPI.COMM_WORLD, given.n, given.bodies)
+        found = costs(MPI.COMM_WORLD, given.n, given.bodies)
     if MPI.COMM_WORLD.rank == 0:
         print(json.dumps(found))
 

@@ -101,13 +101,13 @@ def l2_error(
     domain, space, degree = body.domain, body.space, body.degree
     shape, of = shape_of(domain.mesh), geometry_nodes(domain)
     points, weights = rule(shape, 8)
-    measure = volume_factors(shape, of, points) * weights
+    volumes = volume_factors(shape, of, points) * weights
     place = np.einsum("qk,nkd->dnq", shape.lagrange(domain.order, points), of)
-    measure = measure * (place[-1] >= above)
+    volumes = volumes * (place[-1] >= above)
     nodal = x.reshape(-1, domain.dim)[space.dofmap.list[: len(of)]]
     found = np.einsum("qk,nkd->dnq", shape.lagrange(degree, points), nodal)
     known = exact(place.reshape(domain.dim, -1)).reshape(found.shape)
-    squares = [np.sum(measure * part**2) for part in (found - known, known)]
+    squares = [np.sum(volumes * part**2) for part in (found - known, known)]
     off, whole = domain.mesh.comm.allreduce(np.array(squares))
     return float(np.sqrt(off / whole))
 

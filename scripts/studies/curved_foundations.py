@@ -388,7 +388,7 @@ def ratios(solution: Solution, exact: float) -> Array:
 
 
 def series(coarse: bool) -> Iterator[tuple[str, str, tuple[float, ...], Measured]]:
-    """Return problems with their kind and sizes, and the measure of one of a size and degree."""
+    """Return problems with their kind and sizes, and that which solves one of a size and degree."""
     for name in ("ring on a shaft", "ring in a bore"):
         yield name, "2-D", PLANE, partial(rings, name)
     yield "Hertz's cylinder on a plane", "2-D", HERTZ, hertz

@@ -151,7 +151,7 @@ class Found:
     unknowns: int
 
 
-def measure(setting: Setting, solution: Solution) -> Found:
+def compared(setting: Setting, solution: Solution) -> Found:
     """Compare a solution with the closed form. Collective."""
     unit = 1e9 if setting.units == "SI" else 1.0
     nodes, problem = solution.problem.nodes, solution.problem
@@ -184,7 +184,7 @@ def measure(setting: Setting, solution: Solution) -> Found:
 def extrapolated(setting: Setting, extent: float = 30.0) -> tuple[Found, list[Found]]:
     """Return the extrapolation to no box, and the results of the two boxes. Collective."""
     boxes = [extent, 2 * extent]
-    found = [measure(setting, solved(setting.case(box))) for box in boxes]
+    found = [compared(setting, solved(setting.case(box))) for box in boxes]
 
     def limit(name: str) -> float:
         x = [f.radius / RADIUS / box for f, box in zip(found, boxes, strict=True)]

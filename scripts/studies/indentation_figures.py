@@ -25,7 +25,7 @@ from scripts.studies.indentation import (
     MOMENTS,
     RADIUS,
     Setting,
-    measure,
+    compared,
 )
 
 #: Radius of the ball (m), velocities (m/s) and the time that it is driven (s).
@@ -40,7 +40,7 @@ def pressures(report: Report, fineness: float) -> None:
         for potential, colour in ((None, "#0072B2"), (0.0, "#D55E00")):
             setting = Setting("PZT-4", shape, potential, fineness)
             solution = solved(setting.case(40.0))
-            radius, made = measure(setting, solution).radius, contact_table(solution.contact)
+            radius, made = compared(setting, solution).radius, contact_table(solution.contact)
             if made is None:
                 continue
             body, kind = setting.body, "insulating" if potential is None else "grounded"

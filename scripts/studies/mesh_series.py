@@ -60,7 +60,7 @@ class Variant:
         return solved(case, build_problem(case, domain=domain))
 
 
-def measure(variant: Variant) -> tuple[Array, list[float]]:
+def errors_of(variant: Variant) -> tuple[Array, list[float]]:
     """Return relative errors, shape (meshes, 3), and the residuals of the solves. Collective."""
     nested = not variant.penalised and variant.power == 1.0
     reference = variant.solve(variant.reference, nested)
@@ -96,7 +96,7 @@ def mesh_series(
     columns["residual"] = []
     results = {}
     for variant in variants:
-        found, residuals = measure(variant)
+        found, residuals = errors_of(variant)
         results[variant.label] = found
         h = 1 / np.array(variant.cells)
         columns["problem"] += [variant.label] * h.size

@@ -127,12 +127,12 @@ def norms(body: BodyEquilibrium) -> Callable[[Array], Array]:
     parts = (strain(u), ufl.grad(phi), u, phi)
     forms = [fem.form(ufl.inner(part, part) * body.domain.dx) for part in parts]
 
-    def measure(x: Array) -> Array:
+    def norms_of(x: Array) -> Array:
         difference.x.array[:] = x
         squares = [body.comm.allreduce(fem.assemble_scalar(form)) for form in forms]
         return np.sqrt(squares)
 
-    return measure
+    return norms_of
 
 
 def figure_8_7(report: Report) -> dict[str, Array]:
@@ -145,11 +145,11 @@ def figure_8_7(report: Report) -> dict[str, Array]:
     for label, name in (("Example 8.1", "piezo-8-1-conductive"), ("Example 8.2", "piezo-8-2")):
         reference = solution_of(name, (last, last // 2))
         x, body = reference.state.x, reference.problem.body
-        measure, rows = norms(body), []
+        norms_of, rows = norms(body), []
         for n in cells:
             solution = solution_of(name, (n, n // 2))
             other = carry(solution.problem.body.function(solution.state.x), body.space)
-            rows.append(measure(other.x.array - x) / measure(x))
+            rows.append(norms_of(other.x.array - x) / norms_of(x))
         errors, h = np.array(rows), 4.0 / (np.array(cells) / 2)
         found[label] = errors
         columns["problem"] += [label] * h.size

@@ -152,7 +152,7 @@ class Found:
     h: float
 
 
-def measure(solution: Solution, load: float) -> Found:
+def contact_of(solution: Solution, load: float) -> Found:
     """Measure contact radius, peak pressure and force; the axis is x = 0. Collective."""
     nodes = solution.problem.nodes
     d = nodes.dim
@@ -189,7 +189,7 @@ def run(case: Case, load: float) -> tuple[Solution, Found]:
     loads = (first.model_copy(update={"traction": traction}), *case.load[1:])
     case = case.model_copy(update={"load": loads})
     solution = solved(case, build_problem(case, domain=domain))
-    return solution, measure(solution, load)
+    return solution, contact_of(solution, load)
 
 
 #: Load, mu, direction and shape of the rows of the table of cylinders.

@@ -143,14 +143,14 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
         problem = build_problem(case)
         reference = solved(case, problem)
         distances, residuals, dual, ratios = [], [], [], []
-        measure = DualNorm(problem)
+        dual_norm = DualNorm(problem)
         for eps in values:
             small = ("solver.method=penalty", f"solver.eps_contact={eps}", "solver.max_outer=1000")
             solution = checked(solve(problem, _with(n, changes, *small).solver))
             distances.append(distance(reference, solution))
             residuals.append(solution.outcome.residuals.equilibrium)
-            dual.append(measure.pressure(reference.pressure - solution.pressure))
-            ratios.append(dual[-1] / measure.displacement(reference.state.x, solution.state.x))
+            dual.append(dual_norm.pressure(reference.pressure - solution.pressure))
+            ratios.append(dual[-1] / dual_norm.displacement(reference.state.x, solution.state.x))
         energy = [d.energy for d in distances]
         pressure = [d.pressure for d in distances]
         columns["law"] += [label] * len(values)

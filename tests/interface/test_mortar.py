@@ -39,7 +39,7 @@ PAIR_NAMES = [f"{a.name}-{p}-{b.name}-{q}" for (a, p), (b, q) in PAIRS]
 def loads(side, nodes):
     """Return the nodal loads of a unit pressure."""
     at, weights = rule(side.shape, 8)
-    share = side.measures(at, weights) @ side.shape.lagrange(side.degree, at)
+    share = side.integration_weights(at, weights) @ side.shape.lagrange(side.degree, at)
     total = np.zeros(nodes.size)
     np.add.at(total, np.searchsorted(nodes, side.nodes), share)
     return total

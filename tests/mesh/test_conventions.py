@@ -16,7 +16,7 @@ from contact.mesh.contents import Contents
 from contact.mesh.reader import from_file
 from tests.problems import files
 from tests.problems.quadrilaterals import unit_block
-from tests.problems.sizes import integral, measures
+from tests.problems.sizes import integral, sizes_of_parts
 
 COMM = MPI.COMM_WORLD
 
@@ -196,7 +196,7 @@ def test_tags_of_dolfinx_are_parts_and_regions(cell, shared_tmp_path):
         file.write_meshtags(tags, made.geometry)
         file.write_meshtags(half, made.geometry)
     domain = from_file(COMM, path)
-    assert measures(domain) == pytest.approx({"sides 3": 1.0, "sides 5": 1.0})
+    assert sizes_of_parts(domain) == pytest.approx({"sides 3": 1.0, "sides 5": 1.0})
     assert COMM.allreduce(len(domain.regions["half 7"])) == expected[1]
     assert integral(domain) == pytest.approx(1.0)
     assert domain.notes == ()

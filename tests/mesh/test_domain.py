@@ -23,7 +23,7 @@ from contact.mesh.transfer import refined
 from contact.ranks import on_root
 from tests.problems import files
 from tests.problems.messages import message_of
-from tests.problems.sizes import integral, measures
+from tests.problems.sizes import integral, sizes_of_parts
 
 COMM = MPI.COMM_WORLD
 
@@ -54,7 +54,7 @@ def test_rectangle_has_its_sides_and_pieces(diagonal, rotation):
     }
     domain = rectangle(COMM, (0, 0), (4, 1), (8, 4), parts, diagonal, rotation)
     expected = {**BAR, "loaded": 2.0, "ends": 1.0, "clamped": 1.0}
-    assert measures(domain) == pytest.approx(expected, abs=1e-13)
+    assert sizes_of_parts(domain) == pytest.approx(expected, abs=1e-13)
     assert integral(domain) == pytest.approx(4.0)
     assert (domain.dim, domain.size) == (2, 4.0)
 
@@ -65,7 +65,7 @@ def test_box_has_its_sides_and_pieces():
     parts = {"loaded": Piece("top", (2.0, 0.0), (4.0, 0.5)), "low": Piece("right", None, (1, 0))}
     domain = box(COMM, (0, 0, -1), (4, 1, 2), (4, 2, 4), parts)
     expected = {**BRICK, "loaded": 1.0, "low": 1.0}
-    assert measures(domain) == pytest.approx(expected, abs=1e-13)
+    assert sizes_of_parts(domain) == pytest.approx(expected, abs=1e-13)
     planes = {
         "left": (0, 0.0),
         "right": (0, 4.0),
@@ -89,7 +89,7 @@ def test_pieces_of_the_vertical_faces_of_a_box_run_along_the_other_axes():
     x = all_midpoints(domain, "b")
     assert x[:, 0].min() > 1.0
     assert (x[:, 2].min() > 0.5) and (x[:, 2].max() < 1.5)
-    assert {n: m for n, m in measures(domain).items() if n in parts} == pytest.approx(
+    assert {n: m for n, m in sizes_of_parts(domain).items() if n in parts} == pytest.approx(
         {"a": 0.5, "b": 3.0}
     )
 
@@ -158,7 +158,7 @@ def test_parts_of_a_dolfinx_mesh(ghosts):
     mesh = dmesh.create_unit_cube(COMM, 3, 3, 3, ghost_mode=ghosts)
     low = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], 0.0))
     domain = from_mesh(mesh, {"low": low, "half": lambda x: x[0] < 0.34})
-    assert measures(domain) == pytest.approx({"low": 1.0, "half": 1.0 + 4.0 / 3.0})
+    assert sizes_of_parts(domain) == pytest.approx({"low": 1.0, "half": 1.0 + 4.0 / 3.0})
     assert domain.size == 1.0
 
 
@@ -167,7 +167,7 @@ def test_parts_of_a_dolfinx_mesh(ghosts):
 def test_ranks_without_cells():
     domain = rectangle(COMM, (0, 0), (1, 1), (1, 1))
     assert domain.mesh.topology.index_map(2).size_global == 2
-    assert measures(domain) == pytest.approx(dict.fromkeys(BAR, 1.0))
+    assert sizes_of_parts(domain) == pytest.approx(dict.fromkeys(BAR, 1.0))
     assert domain.size == 1.0
 
 
@@ -212,7 +212,7 @@ def test_domain_of_a_case_file_section(kind, monkeypatch, request):
     monkeypatch.chdir(request.config.rootpath)
     given, expected = SECTIONS[kind]
     domain = MeshSection.model_validate(given).build(COMM)
-    assert measures(domain) == pytest.approx(expected)
+    assert sizes_of_parts(domain) == pytest.approx(expected)
 
 
 def two_regions():
@@ -261,7 +261,7 @@ def refinable():
 def test_refinement_keeps_the_parts(kind):
     coarse = refinable()[kind]()
     fine = refined(refined(coarse))
-    assert measures(fine) == pytest.approx(measures(coarse))
+    assert sizes_of_parts(fine) == pytest.approx(sizes_of_parts(coarse))
     assert integral(fine) == pytest.approx(integral(coarse))
     assert integral(fine, region="body") == pytest.approx(integral(coarse))
     assert (shape_of(fine.mesh), fine.levels) == (shape_of(coarse.mesh), 2)

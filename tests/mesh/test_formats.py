@@ -20,7 +20,7 @@ from contact.mesh.reader import FORMATS, _by_meshio, from_file, mesh_files
 from contact.ranks import on_root
 from tests.mesh.test_conventions import HEXAHEDRA, cells
 from tests.problems import files
-from tests.problems.sizes import integral, measures
+from tests.problems.sizes import integral, sizes_of_parts
 
 COMM = MPI.COMM_WORLD
 
@@ -160,7 +160,7 @@ def test_sets_of_abaqus_are_parts_and_regions(shared_tmp_path):
     on_root(COMM, lambda: path.write_text(PLATE))
     domain = from_file(COMM, path)
     expected = {"top": 2.0, "side": 1.0, "Nall": 6.0, "ground": 2.0, "below": 2.0}
-    assert measures(domain) == pytest.approx(expected)
+    assert sizes_of_parts(domain) == pytest.approx(expected)
     assert regions(domain) == pytest.approx({"Eall": 2.0, "Right": 1.0, "both": 2.0})
     assert domain.notes == ()
 
@@ -174,7 +174,7 @@ def test_faces_of_twenty_node_bricks(shared_tmp_path):
     COMM.barrier()
     domain = from_file(COMM, path)
     expected = {"low": 2.0, "high": 2.0, "front": 1.0, "end": 1.0, "back": 1.0, "start": 1.0}
-    assert measures(domain) == pytest.approx({**expected, "skin": 10.0})
+    assert sizes_of_parts(domain) == pytest.approx({**expected, "skin": 10.0})
     assert domain.notes == ()
     x = domain.mesh.geometry.x
     for part, axis, value in (("low", 2, 0), ("high", 2, 1), ("front", 1, 0), ("end", 0, 2)):
@@ -204,7 +204,7 @@ def test_other_formats(name, shared_tmp_path):
     parts, cells = FILES[name]
     on_root(COMM, lambda: write_other(shared_tmp_path / name, name))
     domain = from_file(COMM, shared_tmp_path / name)
-    assert measures(domain) == pytest.approx(parts)
+    assert sizes_of_parts(domain) == pytest.approx(parts)
     assert regions(domain) == pytest.approx(cells)
 
 
@@ -236,7 +236,7 @@ def test_a_format_of_meshio_is_one_entry(tmp_path, monkeypatch):
     monkeypatch.setitem(FORMATS, ".su2", ("SU2", partial(_by_meshio, "su2")))
     (tmp_path / "plate.su2").write_text(SU2)
     domain = from_file(MPI.COMM_SELF, tmp_path / "plate.su2")
-    assert measures(domain) == pytest.approx({"8": 2.0, "9": 2.0})
+    assert sizes_of_parts(domain) == pytest.approx({"8": 2.0, "9": 2.0})
 
 
 def test_the_case_file_names_every_ending():
@@ -252,9 +252,9 @@ def test_groups_of_salome(count, shared_tmp_path):
     path = shared_tmp_path / "piece.med"
     on_root(COMM, lambda: files.write(path, salome(count, 0.0 if count == 8 else 0.05)))
     domain = from_file(COMM, path)
-    bent = 1.0 if count == 8 else measures(domain)["high"]
+    bent = 1.0 if count == 8 else sizes_of_parts(domain)["high"]
     expected = {"low": 2 * bent, "Group_of_faces": 2 * bent, "high": bent, "left": 1.0}
-    assert measures(domain) == pytest.approx(expected, rel=1e-6)
+    assert sizes_of_parts(domain) == pytest.approx(expected, rel=1e-6)
     assert integral(domain) == pytest.approx(2.0)
     assert domain.order == (1 if count == 8 else 2)
 
@@ -281,8 +281,8 @@ def test_input_files_that_gmsh_writes(cell, order, shared_tmp_path):
     COMM.barrier()
     own, other = (from_file(COMM, shared_tmp_path / f"ball.{ending}") for ending in ("msh", "inp"))
     assert own.order == other.order == order
-    found = measures(other)
-    assert {name: found[name] for name in own.parts} == pytest.approx(measures(own))
+    found = sizes_of_parts(other)
+    assert {name: found[name] for name in own.parts} == pytest.approx(sizes_of_parts(own))
     assert regions(other)["body"] == pytest.approx(regions(own)["body"])
 
 
@@ -294,7 +294,7 @@ def test_side_sets_of_exodus(tmp_path):
     files.write(path, Contents(points, [("hexahedron", np.arange(8)[None])]))
     files.add_side_sets(path, {10 + side: [(1, side)] for side in range(1, 7)})
     domain = from_file(MPI.COMM_SELF, path)
-    assert measures(domain) == pytest.approx({str(k): 1.0 for k in range(11, 17)})
+    assert sizes_of_parts(domain) == pytest.approx({str(k): 1.0 for k in range(11, 17)})
     # Outward normals: -y, x, y, -x, -z, z.
     middles = {"11": (1, 0.0), "12": (0, 1.0), "13": (1, 1.0), "14": (0, 0.0), "15": (2, 0.0)}
     from dolfinx.mesh import compute_midpoints
@@ -342,7 +342,7 @@ def test_binary_arrays_are_beside_their_xdmf(tmp_path, monkeypatch):
     meshio.write("part.xdmf", made, data_format="Binary")
     monkeypatch.chdir("/")
     domain = from_file(MPI.COMM_SELF, tmp_path / "part.xdmf")
-    assert measures(domain) == pytest.approx({"set 1": 1.0})
+    assert sizes_of_parts(domain) == pytest.approx({"set 1": 1.0})
     assert {path.name for path in mesh_files(tmp_path / "part.xdmf")} == {
         path.name for path in tmp_path.iterdir()
     }
@@ -358,7 +358,7 @@ def test_labels_of_nodes_of_medit_are_no_parts(tmp_path):
     cells = {"medit:ref": [np.array([1]), np.array([2])]}
     meshio.write(tmp_path / "part.vtu", meshio.Mesh(points, blocks, labels, cells))
     domain = from_file(MPI.COMM_SELF, tmp_path / "part.vtu")
-    assert measures(domain) == pytest.approx({"2": 1.0})
+    assert sizes_of_parts(domain) == pytest.approx({"2": 1.0})
     assert [*domain.regions] == ["1"]
 
 

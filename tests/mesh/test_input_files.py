@@ -19,7 +19,7 @@ from contact.errors import InputError
 from contact.mesh.contents import Contents
 from contact.mesh.reader import from_file, from_msh
 from tests.problems import files
-from tests.problems.sizes import integral, measures
+from tests.problems.sizes import integral, sizes_of_parts
 
 
 def cube(n: int = 2) -> Contents:
@@ -52,7 +52,7 @@ def test_a_cell_that_stands_twice_counts_once(order, tmp_path):
     again += f"12, {order}\n*NSET, NSET=low, GENERATE\n1, 9\n*ELSET, ELSET=all\nEall, again, more\n"
     again += "*SURFACE, NAME=skin\nall,\n"
     domain = read(tmp_path, block() + again)
-    assert measures(domain) == pytest.approx({"low": 1.0, "skin": 6.0})
+    assert sizes_of_parts(domain) == pytest.approx({"low": 1.0, "skin": 6.0})
     assert integral(domain) == pytest.approx(1.0)
     assert {name: len(cells) for name, cells in domain.regions.items()} == {
         **{"Eall": 8, "again": 1, "more": 1, "all": 8}
@@ -64,13 +64,13 @@ def test_a_cell_that_stands_twice_counts_once(order, tmp_path):
 def test_either_side_of_a_shell_is_the_facet(label, tmp_path):
     text = f"*SURFACE, NAME=low\nshell, {label}\n*NSET, NSET=high, GENERATE\n19, 27\n"
     domain = read(tmp_path, block() + SHELLS + text)
-    assert measures(domain) == pytest.approx({"low": 1.0, "shell": 1.0, "high": 1.0})
+    assert sizes_of_parts(domain) == pytest.approx({"low": 1.0, "shell": 1.0, "high": 1.0})
 
 
 def test_edges_of_shells_are_no_facets_of_solids(tmp_path):
     edges = "*SURFACE, NAME=rim\nshell, S3\nshell, E2\n*SURFACE, NAME=both\nshell, S4\n5, S2\n"
     domain = read(tmp_path, block() + SHELLS + edges)
-    assert measures(domain) == pytest.approx({"both": 0.25, "shell": 1.0})
+    assert sizes_of_parts(domain) == pytest.approx({"both": 0.25, "shell": 1.0})
     assert "'rim' has no facets" in domain.unusable["rim"]
 
 
@@ -86,7 +86,7 @@ def test_nodes_of_a_set_of_elements(tmp_path):
     sets = "*NSET, NSET=layer, ELSET=lowest\n*ELSET, ELSET=lowest, GENERATE\n1, 4\n"
     sets += "*NSET, NSET=high, GENERATE\n19, 27\n*NSET, NSET=both\nlayer, high\n"
     domain = read(tmp_path, block() + sets)
-    assert measures(domain) == pytest.approx({"layer": 1 + 4 / 2, "high": 1.0, "both": 6.0})
+    assert sizes_of_parts(domain) == pytest.approx({"layer": 1 + 4 / 2, "high": 1.0, "both": 6.0})
 
 
 def test_sets_and_surfaces_of_one_name(tmp_path):
@@ -95,7 +95,7 @@ def test_sets_and_surfaces_of_one_name(tmp_path):
     sets += "*NSET, NSET=End, GENERATE\n19, 27\n*SURFACE, NAME=end\n5, S2\n"
     sets += "*NSET, NSET=nodal, GENERATE\n1, 9\n*SURFACE, NAME=NODAL, TYPE=NODE\nEND\n"
     domain = read(tmp_path, block() + sets)
-    assert measures(domain) == pytest.approx({"low": 1.0, "End": 0.25, "nodal": 1.0})
+    assert sizes_of_parts(domain) == pytest.approx({"low": 1.0, "End": 0.25, "nodal": 1.0})
 
 
 PARTS = """*PART, NAME=Part-1
@@ -121,7 +121,7 @@ def test_a_part_and_its_assembly_have_names_of_their_own(tmp_path):
     sets = "*NSET, NSET=Set-1, INSTANCE=Part-1-1, GENERATE\n1, 9\n"
     sets += "*ELSET, ELSET=set-1, INSTANCE=Part-1-1\n1, 2\n"
     domain = read(tmp_path, in_parts(sets))
-    assert measures(domain) == pytest.approx({"Set-1": 1.0, "Part-1-1.Set-1": 6.0})
+    assert sizes_of_parts(domain) == pytest.approx({"Set-1": 1.0, "Part-1-1.Set-1": 6.0})
     found = {name: len(cells) for name, cells in domain.regions.items()}
     assert found == {"Part-1-1.Set-1": 8, "Set-1": 2}
 
@@ -173,7 +173,7 @@ def test_mesh_files_are_read_with_their_parts(name):
     dim, expected = GOOD[name]
     domain = from_msh(COMM, FIXTURES / name)
     assert domain.dim == dim
-    assert measures(domain) == pytest.approx(expected)
+    assert sizes_of_parts(domain) == pytest.approx(expected)
 
 
 @pytest.mark.core
@@ -182,7 +182,7 @@ def test_cells_of_second_order_keep_their_nodes():
     domain = from_msh(COMM, FIXTURES / "curved.msh")
     assert domain.order == 2 and domain.mesh.geometry.index_map().size_global == 6
     arc = (np.sqrt(1.16) + np.arcsinh(0.4) / 0.4) / 2  # of a parabola
-    assert measures(domain) == pytest.approx({"bottom": arc, "top": 2**0.5}, rel=1e-3)
+    assert sizes_of_parts(domain) == pytest.approx({"bottom": arc, "top": 2**0.5}, rel=1e-3)
 
 
 @pytest.mark.parallel

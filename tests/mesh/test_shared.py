@@ -10,7 +10,7 @@ from contact.cli.main import CONVERGED, main
 from contact.mesh.reader import from_file
 from contact.ranks import on_root
 from tests.mesh.test_formats import PLATE, bricks, regions
-from tests.problems.sizes import integral, measures
+from tests.problems.sizes import integral, sizes_of_parts
 
 pytest.importorskip("h5py")
 
@@ -78,7 +78,7 @@ def written(folder, name):
 def test_a_shared_mesh_is_its_source(name, shared_tmp_path, capsys):
     source, made = written(shared_tmp_path, name)
     one, other = from_file(COMM, source), from_file(COMM, made)
-    assert measures(other) == pytest.approx(measures(one), rel=1e-13)
+    assert sizes_of_parts(other) == pytest.approx(sizes_of_parts(one), rel=1e-13)
     assert regions(other) == pytest.approx(regions(one), rel=1e-13)
     assert [*other.parts] == [*one.parts]
     assert other.order == one.order == (2 if name == "bent.inp" else 1)

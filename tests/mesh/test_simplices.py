@@ -14,7 +14,7 @@ from contact.mesh.contents import Cells, Contents, Groups, check
 from contact.mesh.reader import from_file
 from contact.ranks import on_root
 from tests.problems import files
-from tests.problems.sizes import integral, measures
+from tests.problems.sizes import integral, sizes_of_parts
 
 COMM = MPI.COMM_WORLD
 FIXTURES = Path(meshes.__file__).parent / "fixtures"
@@ -136,7 +136,7 @@ def test_files_of_unlike_cells_keep_their_sets(name, shared_tmp_path):
     domain = from_file(COMM, path)
     found = {region: integral(domain, region=region) for region in VOLUMES}
     assert found == pytest.approx(VOLUMES)
-    areas = measures(domain)
+    areas = sizes_of_parts(domain)
     expected = {"start": 1.0, "end": 1.0}
     if name == "stack.inp":
         # A surface of a square and a triangle, and all that bounds one cell alone.
@@ -150,7 +150,7 @@ def test_files_of_unlike_cells_keep_their_sets(name, shared_tmp_path):
 def test_quadrilaterals_beside_triangles():
     """From Gmsh: a square and a triangle under one name."""
     domain = from_file(COMM, FIXTURES / "two-kinds.msh")
-    assert measures(domain) == pytest.approx({"bottom": 1.0, "top": 1.0})
+    assert sizes_of_parts(domain) == pytest.approx({"bottom": 1.0, "top": 1.0})
     assert integral(domain, region="body") == pytest.approx(1.5)
     note = "its cells, 'Triangle 3' beside 'Quadrilateral 4', become triangles with straight edges"
     assert domain.notes == (f"{note}: a mesh has cells of one kind",)
@@ -165,7 +165,7 @@ def test_cells_of_second_order_become_straight(tmp_path):
     lines += ["*SURFACE, NAME=ground", "square, S1", "corner, S1"]
     (tmp_path / "plate.inp").write_text("\n".join(lines) + "\n")
     domain = from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
-    assert domain.order == 1 and measures(domain) == pytest.approx({"ground": 2.0})
+    assert domain.order == 1 and sizes_of_parts(domain) == pytest.approx({"ground": 2.0})
     assert integral(domain, region="corner") == pytest.approx(0.5)
     assert domain.notes == (
         "its cells, 'Quadrilateral 4' beside 'Triangle 6', become triangles with straight edges: a "
@@ -180,7 +180,7 @@ def test_prisms_alone_and_side_sets_of_exodus(tmp_path):
     files.write(path, Contents(points, [("wedge", np.arange(6)[None])]))
     files.add_side_sets(path, {1: [(1, side) for side in range(1, 6)]})
     domain = from_file(MPI.COMM_SELF, path)
-    assert measures(domain) == pytest.approx({"1": 3 + 2**0.5})
+    assert sizes_of_parts(domain) == pytest.approx({"1": 3 + 2**0.5})
     assert domain.notes == (
         "its cells, 'Prism 6', become tetrahedra with straight edges: a mesh has cells of one kind",
     )
@@ -228,7 +228,7 @@ def test_quadrilaterals_that_are_triangles_and_free_faces_of_prisms(tmp_path):
     (tmp_path / "plate.inp").write_text(plate)
     domain = from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
     assert integral(domain) == pytest.approx(1.5)
-    assert measures(domain) == pytest.approx({"rim": 4 + 2**0.5, "end": 2.0})
+    assert sizes_of_parts(domain) == pytest.approx({"rim": 4 + 2**0.5, "end": 2.0})
     # Two prisms that share a square, each as a hexahedron, collapsed at corners of other numbers.
     prisms = "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n"
     prisms += "*ELEMENT,TYPE=C3D8,ELSET=all\n1,1,2,3,3,5,6,7,7\n2,3,4,1,1,7,8,5,5\n"
@@ -236,4 +236,4 @@ def test_quadrilaterals_that_are_triangles_and_free_faces_of_prisms(tmp_path):
     (tmp_path / "prisms.inp").write_text(prisms)
     domain = from_file(MPI.COMM_SELF, tmp_path / "prisms.inp")
     assert integral(domain) == pytest.approx(1.0)
-    assert measures(domain) == pytest.approx({"skin": 6.0, "low": 1.0, "end": 2.0})
+    assert sizes_of_parts(domain) == pytest.approx({"skin": 6.0, "low": 1.0, "end": 2.0})

@@ -11,7 +11,7 @@ from contact.mesh.cells import shape_of
 from contact.mesh.reader import from_generator, from_msh
 from meshes.__main__ import main
 from tests.problems.messages import message_of
-from tests.problems.sizes import integral, measures
+from tests.problems.sizes import integral, sizes_of_parts
 
 COMM = MPI.COMM_WORLD
 
@@ -158,7 +158,7 @@ def test_generators_make_their_parts(name):
     volume, expected = GENERATORS[name]
     domain = from_generator(COMM, name)
     # Straight sides miss a little of a round body.
-    assert measures(domain) == pytest.approx(expected, rel=1e-2)
+    assert sizes_of_parts(domain) == pytest.approx(expected, rel=1e-2)
     assert integral(domain) == pytest.approx(volume, rel=2e-2)
 
 
@@ -184,7 +184,7 @@ def test_generators_make_other_cells(name, order):
     assert domain.order == (order if name in ROUND else 1)
     # Sides of second order miss next to nothing of a round body.
     least = {1: 3e-2, 2: 5e-4}[order]
-    assert measures(domain) == pytest.approx(expected, rel=least)
+    assert sizes_of_parts(domain) == pytest.approx(expected, rel=least)
     assert integral(domain) == pytest.approx(volume, rel=least)
 
 
@@ -270,7 +270,9 @@ def test_command_line_writes_a_mesh(tmp_path, version):
     assert main(arguments) == 0
     assert path.read_text().split()[1] == version
     domain = from_msh(COMM, path)
-    assert measures(domain) == pytest.approx({**BAR, "bottom": 5.0, "top": 5.0, "loaded": 3.0})
+    assert sizes_of_parts(domain) == pytest.approx(
+        {**BAR, "bottom": 5.0, "top": 5.0, "loaded": 3.0}
+    )
     disc = ["quarter_disc", "--cell", "quadrilateral", "--order", "2", *arguments[5:]]
     assert main(disc) == 0
     domain = from_msh(COMM, path)

@@ -19,7 +19,7 @@ from contact.cli.setup import draw_setup
 from contact.history import BodyState
 from contact.linear.layout import times
 from contact.linear.transformation import TransformedBulk
-from scripts.benchmarks.weak import measure, problem_of
+from scripts.benchmarks.weak import costs, problem_of
 from scripts.cases import CASES
 from tests.problems.bar import changed
 
@@ -37,7 +37,7 @@ def test_no_rank_has_more_where_there_are_more(bodies: int) -> None:
     for size in range(1, COMM.size + 1):
         some = COMM.Split(0 if COMM.rank < size else MPI.UNDEFINED, COMM.rank)
         if some != MPI.COMM_NULL:
-            found[size] = measure(some, 8, bodies)
+            found[size] = costs(some, 8, bodies)
         COMM.Barrier()
     found = COMM.bcast(found)  # the first rank is in all of them
     for size, counts in found.items():

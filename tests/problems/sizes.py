@@ -35,6 +35,6 @@ def integral(domain, of=1.0, part=None, region=None):
     return domain.comm.allreduce(float(own), op=MPI.SUM)
 
 
-def measures(domain):
+def sizes_of_parts(domain):
     """Return the length or area of each part."""
     return {name: area(domain, name) for name in domain.parts}

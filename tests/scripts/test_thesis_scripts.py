@@ -66,12 +66,12 @@ def test_the_dual_norm_of_a_pressure_is_the_energy_that_it_makes():
     case = case.model_copy(update={"friction": Friction()})
     problem = build_problem(case)
     exact = solve(problem, case.solver)
-    measure, distances = DualNorm(problem), []
+    dual_norm, distances = DualNorm(problem), []
     for eps in (1e-2, 1e-3):
         options = bar(4, -0.005, 1e4, "solver.method=penalty", f"solver.eps_contact={eps}").solver
         penalised = solve(problem, options)
-        distances.append(measure.pressure(exact.pressure - penalised.pressure))
-        moved = measure.displacement(exact.state.x, penalised.state.x)
+        distances.append(dual_norm.pressure(exact.pressure - penalised.pressure))
+        moved = dual_norm.displacement(exact.state.x, penalised.state.x)
         assert distances[-1] == pytest.approx(moved, rel=1e-6)
     assert distances[0] / distances[1] == pytest.approx(10, rel=0.1)
 

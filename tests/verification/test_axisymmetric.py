@@ -222,8 +222,8 @@ def test_the_radial_gradient_is_part_of_norms(comm):
         problem.body.zero_displacement(),
         lambda x: ufl.as_vector([x[0], 0]),
     )
-    measure = np.pi * 0.5 * (2.0**2 - 1.0)
-    assert e.h1**2 == pytest.approx(2 * measure, rel=1e-12)
+    volume = np.pi * 0.5 * (2.0**2 - 1.0)
+    assert e.h1**2 == pytest.approx(2 * volume, rel=1e-12)
 
 
 def test_a_radial_displacement_on_the_axis_is_refused(comm):

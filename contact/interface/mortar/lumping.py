@@ -24,8 +24,8 @@ from contact.typing import Array
 
 def integrals(surface: Surface) -> Array:
     """Return int N~ over whole facets, shape (f, k)."""
-    _, measure, functions = _integrated(surface)
-    return np.asarray(measure @ functions)
+    _, weights, functions = _integrated(surface)
+    return np.asarray(weights @ functions)
 
 
 def _integrated(surface: Surface) -> tuple[Array, Array, Array]:
@@ -33,7 +33,7 @@ def _integrated(surface: Surface) -> tuple[Array, Array, Array]:
     places, weights = rule(surface.shape, 4 * surface.order)
     change = dual_basis_transformation(surface.shape, surface.degree)
     functions = surface.shape.lagrange(surface.degree, places) @ change.T
-    return places, surface.measures(places, weights), functions
+    return places, surface.integration_weights(places, weights), functions
 
 
 @dataclass(frozen=True)
@@ -132,12 +132,12 @@ class Lumping:
     def of(surface: Surface) -> Lumping:
         """Return the areas, given the facets that this rank owns. Collective."""
         owners, count, d = surface.owners, surface.nodes.size, surface.normal.shape[1]
-        places, measure, functions = _integrated(surface)
-        areas, shares = measure @ functions, measure[:, :, None] * functions
+        places, weights, functions = _integrated(surface)
+        areas, shares = weights @ functions, weights[:, :, None] * functions
         if surface.order > 1:
             # Means on curved facets would be the normals at the centroids of the functions.
             places = surface.shape.nodes(surface.degree)
-            shares = measure.sum(axis=1)[:, None, None] * np.eye(len(places))
+            shares = weights.sum(axis=1)[:, None, None] * np.eye(len(places))
         slopes = jacobians(surface.shape, surface.points, places)
         normals = surface.normals(np.arange(surface.count)[:, None], slopes)
         height, least = np.moveaxis(surface.node_heights, 2, 0)

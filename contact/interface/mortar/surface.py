@@ -364,7 +364,7 @@ class Surface:
         both = np.column_stack([height, self.height_bounds(facets, at)[0]])
         return both.reshape(self.count, len(places), 2)
 
-    def measures(self, at: Array, weights: Array) -> Array:
+    def integration_weights(self, at: Array, weights: Array) -> Array:
         """Return the weights of a rule's points in integrals over facets or rings, (f, q)."""
         return integration_weights(self.revolved, self.shape, self.points, at, weights)
 
