@@ -42,7 +42,7 @@ def given_loads(
         _check(domain, body, load, f"load.{number}")
         over = domain.dx if load.on is None else domain.ds(load.on)
         vectors: dict[tuple[str, bool], list[Expr]] = {}
-        for name, field in load.named.items():
+        for name, field in load.given.items():
             value = expression(domain, field, x, time, f"load.{number}.{name}")
             varies, (key, *component) = isinstance(field, Moving), name.split(".")
             if not component:
@@ -69,7 +69,7 @@ def _check(domain: Domain, body: Body, load: Load, key: str) -> None:
                 f"{domain.dim}",
                 "components",
             )
-    if body.piezo is None and any(name.endswith("charge") for name in load.named):
+    if body.piezo is None and any(name.endswith("charge") for name in load.given):
         raise InputError(f"load on {place}: a charge needs a piezoelectric material", "piezo")
     if domain.revolved and load.force is not None and not is_zero(load.force[0]):
         raise InputError(
@@ -168,7 +168,7 @@ def wrong_load(loads: Sequence[Load], domain: Domain, time: float) -> str:
     x = ufl.SpatialCoordinate(domain.mesh)
     for i, load in enumerate(loads):
         dx = domain.dx if load.on is None else domain.ds(load.on)
-        for name, field in load.named.items():
+        for name, field in load.given.items():
             form = compiled(expression(domain, field, x, time, f"load.{i}.{name}") * dx)
             if not abs(summed(domain.comm, fem.assemble_scalar(form))) <= HUGE:
                 return f"load.{i}.{name}"

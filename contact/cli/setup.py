@@ -95,7 +95,7 @@ def _parts(case: Case, problem: ContactProblem) -> Iterator[Part]:
         found = normals_at(domain, domain.facets_anywhere(part), 1)[2].mean(axis=1)
         return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
 
-    def named(section: Any, words: str, fields: Iterable[Any]) -> str:
+    def with_time(section: Any, words: str, fields: Iterable[Any]) -> str:
         amplitude = f", amplitude {section.amplitude}" if section.amplitude else ""
         formula = f", t = {time:g}" if case.evolution and knows_time([*fields]) else ""
         return words + amplitude + formula
@@ -115,7 +115,7 @@ def _parts(case: Case, problem: ContactProblem) -> Iterator[Part]:
         corners = facets(fixed.on)
         places = corners.mean(axis=1)
         moved = components(fixed.components.items(), places)
-        words = named(fixed, f"fixed {fixed.on}", fixed.given.values())
+        words = with_time(fixed, f"fixed {fixed.on}", fixed.given.values())
         yield words, corners, places, moved, normals(fixed.on)
     for key in ("elastic", "bolt", "electrode", "rigid"):
         for section in getattr(case, key):
@@ -134,7 +134,7 @@ def _parts(case: Case, problem: ContactProblem) -> Iterator[Part]:
             force += components(enumerate(load.force), places) / area(domain, load.on)
         if load.pressure is not None:
             force -= np.reshape(at_time(load.pressure, time).numpy(places), (-1, 1)) * outward
-        words = named(load, f"load {load.on or 'in the whole body'}", load.named.values())
+        words = with_time(load, f"load {load.on or 'in the whole body'}", load.given.values())
         yield words, corners, places, force, outward
 
 

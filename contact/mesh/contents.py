@@ -71,7 +71,7 @@ class Kind:
         return Kind(found if found in ELEMENTS else name, nodes)
 
     @staticmethod
-    def named(name: str) -> Kind:
+    def of_meshio(name: str) -> Kind:
         """Return the type of a name of meshio, whose digits are its nodes if it is not straight."""
         stem = name.rstrip("0123456789")
         return Kind.of(name, int(name[len(stem) :] or ELEMENTS[NAMES.get(stem, stem)][1]))

@@ -333,7 +333,7 @@ def _xdmf_mixed(data: Ints) -> list[tuple[str, Ints]]:
         if number not in xdmf_idx_to_meshio_type:
             raise ValueError(f"cells of number {number} in a mixed topology, which are not known")
         name = xdmf_idx_to_meshio_type[number]
-        nodes = Kind.named(name).nodes
+        nodes = Kind.of_meshio(name).nodes
         before = 1 + (number in COUNTED)
         width = before + nodes
         ahead = data[at : at + WINDOW * width]

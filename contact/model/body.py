@@ -239,7 +239,7 @@ class Load(Described):
             if getattr(self, key) is not None:
                 accepted = f"{place}: {', '.join(right)}"
                 raise fault(key, Words(f"given {place}"), accepted, "exclusive-keys")
-        self.require(self.named, right[0], f"at least one of {', '.join(right)}", "load-values")
+        self.require(self.given, right[0], f"at least one of {', '.join(right)}", "load-values")
         return self
 
     @property
@@ -248,7 +248,7 @@ class Load(Described):
         return self.traction if self.body_force is None else self.body_force
 
     @property
-    def named(self) -> dict[str, Field | Moving]:
+    def given(self) -> dict[str, Field | Moving]:
         """All that is given, by the keys that the case file has for it."""
         given: dict[str, Field | Moving | None] = {}
         for key in ("body_force", "traction", "force"):
@@ -260,7 +260,7 @@ class Load(Described):
     @property
     def factor(self) -> Factor:
         """The amplitude, also where none is given."""
-        return amplitude_of(self.amplitude, knows_time([*self.named.values()]))
+        return amplitude_of(self.amplitude, knows_time([*self.given.values()]))
 
 
 class Electrode(Described):

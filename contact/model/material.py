@@ -30,7 +30,7 @@ from contact.model.section import (
     as_tuple,
     by_kind,
 )
-from contact.model.units import SystemOfUnits, UnitSystem, named
+from contact.model.units import SystemOfUnits, UnitSystem, unit_system
 from contact.settings import (
     Accepted,
     Fault,
@@ -325,7 +325,7 @@ class Material(Described):
     @property
     def system(self) -> UnitSystem:
         """The system of units of a material by name."""
-        return self.units if isinstance(self.units, UnitSystem) else named(self.units or "SI")
+        return self.units if isinstance(self.units, UnitSystem) else unit_system(self.units or "SI")
 
     @property
     def piezoelectric(self) -> bool:

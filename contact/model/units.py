@@ -112,7 +112,7 @@ class UnitSystem(Section):
         return math.prod(map(pow, units, EXPONENTS[quantity]))
 
 
-def named(name: str) -> UnitSystem:
+def unit_system(name: str) -> UnitSystem:
     """Return a system by its name."""
     return UnitSystem.model_validate(dict(zip(BASES, SYSTEMS[name], strict=False)))
 

@@ -141,7 +141,7 @@ def overlapping(problem: ContactProblem) -> Iterator[Remark]:
         return
     component, points = problem.body.connected_components[0], problem.body.layout.points
 
-    def named(two: tuple[int, int]) -> list[str]:
+    def names_of(two: tuple[int, int]) -> list[str]:
         names = [", ".join(_regions(problem, component, [one])) for one in two]
         if names[0] == names[1]:
             centres = [middle(problem, points[component == one])[0] for one in two]
@@ -150,7 +150,7 @@ def overlapping(problem: ContactProblem) -> Iterator[Remark]:
 
     # Numbers of components depend on the ranks.
     deepest = max(found.values())
-    names = min(named(two) for two, depth in found.items() if depth > (1 - EPS) * deepest)
+    names = min(names_of(two) for two, depth in found.items() if depth > (1 - EPS) * deepest)
     more = f"; so do {counted(len(found) - 1, 'pair')} more" if len(found) > 1 else ""
     yield (
         f"{' and '.join(names)} overlap by up to {deepest:.3g} in the reference configuration, "

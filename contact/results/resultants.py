@@ -204,7 +204,7 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     magnitude = sum(_sum(problem, np.abs(charges)) for charges in on_parts.values())
     given: dict[str | None, float] = {}
     loads = [
-        load for load in problem.description.loads if {"charge", "body_charge"} & load.named.keys()
+        load for load in problem.description.loads if {"charge", "body_charge"} & load.given.keys()
     ]
     for on in dict.fromkeys(load.on for load in loads):  # None is the whole body
         acting = body.loads_along(body.space, [on]).at(time)

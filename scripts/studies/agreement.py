@@ -54,15 +54,15 @@ def compare(example: Example, coarse: bool) -> Compared:
     case = example.case(coarse)
     branches = Branches(build_problem(case))
     newton = case.solver
-    runs = {"newton": branches.run(newton), "uzawa": branches.run(relaxed(newton))}
+    runs = {"newton": branches.solve(newton), "uzawa": branches.solve(relaxed(newton))}
     start = branches.nested_start(case)
     if start is not None:
-        runs["nested"] = branches.run(newton, start)
+        runs["nested"] = branches.solve(newton, start)
     letters = {name: branches.letter(run) for name, run in runs.items()}
     last: Solution | None = None
     for name, eps in EPS.items():
         settings = penalised(branches, runs["newton"], eps)
-        last = branches.run(settings, None if last is None else last.state)
+        last = branches.solve(settings, None if last is None else last.state)
         runs[name] = last
         letters[name] = branches.letter(branches.next_to(last.state, TOLERANCE))
     return Compared(example, newton, branches, runs, letters)
@@ -240,8 +240,8 @@ def restarted(one: Compared, found: Solution) -> tuple[object, ...]:
     branches = one.branches
     stays, back = [], []
     for settings in (one.newton, relaxed(one.newton)):
-        stays.append(branches.difference(branches.run(settings, found.state), found))
-        back.append(branches.letter(branches.run(settings, branches.disturbed(found))))
+        stays.append(branches.difference(branches.solve(settings, found.state), found))
+        back.append(branches.letter(branches.solve(settings, branches.disturbed(found))))
     return (*(each.largest for each in stays), *back)
 
 

@@ -92,7 +92,7 @@ class Branches:
         self.solutions: dict[str, Solution] = {}
         self._norm = ProductNorm(problem)
 
-    def run(self, settings: Options, start: State | None = None) -> Solution:
+    def solve(self, settings: Options, start: State | None = None) -> Solution:
         """Solve from zero displacement, or from elsewhere, in up to `SOLVES`. Collective."""
         limit = Limit(SOLVES) if settings.method == "uzawa" else None
         return self._ended(METHODS[settings.method](self.problem, settings, limit), start)

@@ -195,7 +195,7 @@ def extrapolated(setting: Setting, extent: float = 30.0) -> tuple[Found, list[Fo
     return replace(found[-1], **{name: limit(name) for name in names}), found
 
 
-def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS) -> None:
+def write_table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS) -> None:
     """Tabulate ratios to the closed forms. Collective."""
     rows = []
     for material in materials:
@@ -282,7 +282,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     fineness = 6.0 if report.coarse else 12.0
     half_spaces(report)
     units_and_poling(report, fineness)
-    table(report, fineness, MATERIALS[:1] if report.coarse else MATERIALS)
+    write_table(report, fineness, MATERIALS[:1] if report.coarse else MATERIALS)
 
 
 if __name__ == "__main__":

@@ -154,7 +154,7 @@ def distance_limit(
     return Errors("rho - rho_0", np.array(thickness), np.array(distances)), depth
 
 
-def table(report: Report, name: str, caption: str, errors: Errors, note: str = "") -> None:
+def write_table(report: Report, name: str, caption: str, errors: Errors, note: str = "") -> None:
     """Write a table of distances, with the observed orders between neighbours."""
     orders = observed_orders(errors.parameter, errors.total)
     columns = {errors.name: errors.parameter, "in V": errors.norms[:, 0]}
@@ -212,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name, (label, errors) in zip(("layer", "printed"), limits.items(), strict=True):
         caption = f"Theorem 6.3: distance of x(mu, k_e) to x(0, 0), Example 8.4, {label}"
         order = errors.order(SMALLEST, 1e-2)
-        table(
+        write_table(
             report,
             f"theorem-6-3-{name}",
             caption,
@@ -229,7 +229,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     stiff = stiffness_limit(cells, stiffness)
     caption = "The normal compliance law (1.28) tends to Signorini's as c grows"
-    table(report, "compliance-stiffness", caption, stiff, NORMS)
+    write_table(report, "compliance-stiffness", caption, stiff, NORMS)
 
     far, depth = distance_limit(cells, thickness)
     caption = "Law (1.29) tends to (1.27), c = 10, as the rigid part moves away"

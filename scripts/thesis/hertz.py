@@ -180,7 +180,7 @@ def contact_of(solution: Solution, load: float) -> Found:
     )
 
 
-def run(case: Case, load: float) -> tuple[Solution, Found]:
+def solved_and_measured(case: Case, load: float) -> tuple[Solution, Found]:
     """Solve a case with the traction scaled to the load on the polygonal body. Collective."""
     domain = case.mesh.build(MPI.COMM_WORLD)
     first = case.load[0]
@@ -215,7 +215,7 @@ def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], So
         hertz = Cylinder(load)
         case = cylinder(load, mu=mu, direction=direction, shape=shape, fineness=fineness)
         part = load / 2 if shape == "quarter_disc" else load
-        solution, found = run(case, part)
+        solution, found = solved_and_measured(case, part)
         solutions[load, mu, direction, shape] = solution
         rows.append(
             {
@@ -313,7 +313,7 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> None:
     hertz = Sphere()
     rows = []
     for fineness, degree in levels:
-        solution, found = run(sphere(fineness, degree), hertz.force / 4)
+        solution, found = solved_and_measured(sphere(fineness, degree), hertz.force / 4)
         dofmap = solution.problem.body.space.dofmap
         rows.append(
             {

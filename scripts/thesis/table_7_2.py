@@ -49,7 +49,7 @@ def penalty(problem: ContactProblem, n: int, load: float, eps: float, *changes: 
     return solve(problem, case.solver)
 
 
-def table(report: Report, n: int) -> None:
+def write_table(report: Report, n: int) -> None:
     """Make the counterpart of Table 7.2. Collective."""
     counts, measured = [], []
     for load in LOADS:
@@ -192,7 +192,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table and the study."""
     report = Report.of(__doc__, "table_7_2", arguments)
     n = 8 if report.coarse else 32
-    table(report, n)
+    write_table(report, n)
     study(report, min(n, 16))
 
 

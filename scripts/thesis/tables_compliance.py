@@ -56,7 +56,7 @@ EXAMPLES = {
 }
 
 
-def run(case: Case, domain: Domain | None = None) -> Solution:
+def solution_of(case: Case, domain: Domain | None = None) -> Solution:
     """Solve a case as far as its method gets. Collective."""
     solution = solve(build_problem(case, domain=domain), case.solver)
     solution.title = case.title
@@ -84,7 +84,7 @@ def table_8_4(
 
         def solution(*changes: str, value: float = value) -> Solution:
             both = f"friction.mu={value}", f"electric.k_e={value}"
-            return run(on_grid(f"compliance-8-4{suffix}", cells, *both, *changes), domain)
+            return solution_of(on_grid(f"compliance-8-4{suffix}", cells, *both, *changes), domain)
 
         lagged = iterations(solution(*LAGGED, *EXACT))
         implicit, newton = solution(), solution("solver.method=newton")
@@ -135,7 +135,7 @@ def difference(a: Solution, b: Solution) -> float:
 
 def examples(report: Report, cells: tuple[int, int]) -> None:
     """Make a table of the results of Examples 8.3 and 8.4. Collective."""
-    solved = {example: run(on_grid(name, cells)) for example, name in EXAMPLES.items()}
+    solved = {example: solution_of(on_grid(name, cells)) for example, name in EXAMPLES.items()}
     report.table(
         "examples-8-3-8-4",
         f"Examples 8.3 and 8.4, {cells[0]} x {cells[1]} cells",

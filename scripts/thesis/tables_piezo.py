@@ -14,7 +14,7 @@ from contact.results.resultants import charge_balance
 from scripts.cases import on_grid
 from scripts.force_balance import force_balance
 from scripts.reporting import Report, append, empty
-from scripts.thesis.tables_compliance import PLAIN, difference, ended, iterations, run
+from scripts.thesis.tables_compliance import PLAIN, difference, ended, iterations, solution_of
 from tests.problems.piezo import first_solve
 
 PHI_F = (0, 1, 2, 4, 8, 16, 32)
@@ -60,7 +60,7 @@ def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:
     for phi_f, thesis in zip(PHI_F, counts, strict=True):
 
         def solution(*changes: str, phi_f: float = phi_f) -> Solution:
-            return run(on_grid(name, cells, f"electric.phi_f={phi_f}", *changes), domain)
+            return solution_of(on_grid(name, cells, f"electric.phi_f={phi_f}", *changes), domain)
 
         lagged = iterations(solution(*LAGGED, "solver.tolerance=1e-9"))
         changes = [counted(solution(*s, *BY_CHANGE)) for s in (LAGGED, SECANT)]
@@ -104,8 +104,8 @@ def other_rho(report: Report, cells: tuple[int, int]) -> None:
         lagged, implicit, shares = [], [], []
         for rho in OTHER_RHO:
             friction = f"friction.mu.rho={rho}"
-            first = run(on_grid(name, cells, friction, *LAGGED, *BY_CHANGE))
-            second = run(on_grid(name, cells, friction, *SECANT, *BY_CHANGE))
+            first = solution_of(on_grid(name, cells, friction, *LAGGED, *BY_CHANGE))
+            second = solution_of(on_grid(name, cells, friction, *SECANT, *BY_CHANGE))
             lagged.append(counted(first))
             implicit.append(counted(second))
             shares.append(second.plastic_share)
@@ -134,7 +134,7 @@ def series(report: Report, number: str, cells: tuple[int, int]) -> None:
     rows: list[dict[str, object]] = []
     domain = build_problem(on_grid(name, cells)).domain
     for k_e in K_E:
-        solution = run(on_grid(name, cells, f"electric.k_e={k_e}", NEWTON), domain)
+        solution = solution_of(on_grid(name, cells, f"electric.k_e={k_e}", NEWTON), domain)
         rows.append({"k_e": k_e, **values(solution)})
     example = {"8.2": "8.1", "8.3": "8.2"}[number]
     report.table(

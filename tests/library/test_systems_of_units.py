@@ -8,7 +8,7 @@ import pytest
 import contact
 from contact.case.file import parse_case, to_toml
 from contact.errors import InputError
-from contact.model.units import SYSTEMS, UnitSystem, named
+from contact.model.units import SYSTEMS, UnitSystem, unit_system
 
 
 def pressed(units, size, shift, volts=None, labels=None, name="steel", **more):
@@ -62,7 +62,7 @@ def test_a_piezoelectric_problem_is_the_same_in_all_systems(name):
     si = contact.solve(pressed("SI", length, shift, volts, name="PZT-5A"))
     table = {"length": "mm", "force": "daN", "potential": "kV"}
     units = table if name == "table" else name
-    system = UnitSystem.model_validate(table) if name == "table" else named(name)
+    system = UnitSystem.model_validate(table) if name == "table" else unit_system(name)
     case = pressed(
         units,
         length / system.unit("length"),

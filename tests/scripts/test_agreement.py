@@ -75,9 +75,9 @@ def test_a_foundation_that_moves_has_unknowns_of_its_own():
     example = Example("ball", "indent-ball", coarse)
     problem = build_problem(example.case(coarse=True))
     branches, newton = Branches(problem), NewtonOptions(tolerance=1e-10)
-    found = branches.run(newton)
+    found = branches.solve(newton)
     assert branches.letter(found) == "A"
-    again = branches.run(newton, branches.disturbed(found))
+    again = branches.solve(newton, branches.disturbed(found))
     assert problem.body.motion(found.state.x).size == 3
     assert branches.letter(again) == "A"
     assert branches.difference(again, found).largest <= AGREE

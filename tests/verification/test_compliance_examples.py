@@ -234,7 +234,7 @@ def test_iterations_are_counted_where_the_residual_ends_the_run():
     changes = "friction.mu=1.4e-5", "electric.k_e=1.4e-5"
     # Its only frictional iteration moves the bound by more than (3.46) allows.
     case = on_grid("compliance-8-4", (24, 4), *changes, "solver.tolerance=1e-9")
-    solution = tables_compliance.run(case)
+    solution = tables_compliance.solution_of(case)
     last = solution.history[-1]
     assert solution.converged
     assert last.iteration == 1

@@ -155,7 +155,7 @@ def test_theorem_4_2(tmp_path):
 
 @pytest.mark.slow
 def test_table_7_2(tmp_path):
-    table_7_2.table(Report(tmp_path), 8)
+    table_7_2.write_table(Report(tmp_path), 8)
     rows = rows_of(tmp_path / "table-7-2.csv")
     assert [int(row["thesis"]) for row in rows] == [6, 9, 13, 14, 10, 14, 15, 16]
     assert all(float(row["residual of (PV_eps)"]) <= 1e-8 for row in rows)

@@ -13,7 +13,7 @@ from scripts.thesis import hertz
 @pytest.mark.core
 @pytest.mark.parallel
 def test_small_load():
-    solution, found = hertz.run(hertz.cylinder(160.0, fineness=16), 80.0)
+    solution, found = hertz.solved_and_measured(hertz.cylinder(160.0, fineness=16), 80.0)
     exact = hertz.Cylinder(160.0)
     assert exact.half_width == pytest.approx(0.86111, rel=1e-4)
     assert exact.half_width / found.h >= 12
@@ -37,7 +37,7 @@ def test_small_load():
 def test_example_7_1(direction, mu, b, p):
     """Ratios to Hertz at b/R = 0.34, where linear elasticity no longer gives Hertz's solution."""
     case = hertz.cylinder(1600.0, mu=mu, direction=direction, fineness=20)
-    _, found = hertz.run(case, 800.0)
+    _, found = hertz.solved_and_measured(case, 800.0)
     exact = hertz.Cylinder(1600.0)
     assert exact.half_width == pytest.approx(2.7231, rel=1e-4)
     assert exact.peak == pytest.approx(374.05, rel=1e-4)
@@ -50,7 +50,7 @@ def test_example_7_1(direction, mu, b, p):
 @pytest.mark.core
 @pytest.mark.parametrize("shape", ["half_disc", "disc"])
 def test_half_and_full_cylinder(shape):
-    _, found = hertz.run(hertz.cylinder(160.0, shape=shape, fineness=12), 160.0)
+    _, found = hertz.solved_and_measured(hertz.cylinder(160.0, shape=shape, fineness=12), 160.0)
     exact = hertz.Cylinder(160.0)
     assert found.moment == pytest.approx(exact.half_width, rel=0.01)
     assert found.peak == pytest.approx(exact.peak, rel=0.01)
@@ -65,7 +65,7 @@ def test_round_foundation(centre, inside):
     circle = Sphere(shape="sphere", centre=(0.0, centre), radius=20.0, inside=inside)
     case = hertz.cylinder(160.0, fineness=20)
     contact = case.contact.model_copy(update={"foundation": circle})
-    _, found = hertz.run(case.model_copy(update={"contact": contact}), 80.0)
+    _, found = hertz.solved_and_measured(case.model_copy(update={"contact": contact}), 80.0)
     assert found.moment == pytest.approx(exact.half_width, rel=0.01)
     assert found.peak == pytest.approx(exact.peak, rel=0.01)
     assert found.force_error < 1e-8
@@ -76,7 +76,7 @@ def test_sphere():
     assert exact.contact_radius == pytest.approx(0.88044, rel=1e-4)
     assert exact.peak == pytest.approx(61.594, rel=1e-4)
     assert exact.approach == pytest.approx(0.077518, rel=1e-4)
-    solution, found = hertz.run(hertz.sphere(4, degree=2), 25.0)
+    solution, found = hertz.solved_and_measured(hertz.sphere(4, degree=2), 25.0)
     assert found.force_error < 1e-8
     assert found.moment == pytest.approx(exact.contact_radius, rel=0.03)
     assert found.centre == pytest.approx(exact.peak, rel=0.03)

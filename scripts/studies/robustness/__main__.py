@@ -113,7 +113,7 @@ def _difference(solution: Solution, other: Solution) -> float:
     return float(sizes[0] / (sizes[1] or 1.0))
 
 
-def table(rows: Sequence[Mapping[str, Any]], methods: Sequence[str]) -> list[dict[str, Any]]:
+def summary_rows(rows: Sequence[Mapping[str, Any]], methods: Sequence[str]) -> list[dict[str, Any]]:
     """Count by family and method."""
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -169,7 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         name, caption = f"{name}-{given.seed}", f"{caption}, drawn anew"
     report = Report(given.out)
     report.numbers(f"{name}-problems", found)
-    report.table(name, caption, table(found, given.methods))
+    report.table(name, caption, summary_rows(found, given.methods))
     return int(any(row["end"] == "false" for row in found))
 
 

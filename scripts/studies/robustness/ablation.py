@@ -257,7 +257,7 @@ LINEAR = {
 }  # fmt: skip
 
 
-def run(problem: Problem, options: NewtonOptions) -> tuple[Solution, float]:
+def timed(problem: Problem, options: NewtonOptions) -> tuple[Solution, float]:
     """Solve a problem; return the seconds of the processor too."""
     begin, case = time.process_time(), problem.case
     given = {name: getattr(case.solver, name) for name in ("tolerance", "linear")}
@@ -282,20 +282,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
     common.append(Problem("compliance-8-4", {}, steep()))
     alone = {name: own(name) for name in {device.own for device in chosen.values()} - {""}}
     for problem in alone.values():
-        run(problem, NewtonOptions())  # loads its forms
-    whole = {one.name: run(one, NewtonOptions()) for one in [*common, *alone.values()]}
+        timed(problem, NewtonOptions())  # loads its forms
+    whole = {one.name: timed(one, NewtonOptions()) for one in [*common, *alone.values()]}
     rows = empty("device", "failed", "slow", "seconds", "problems that need it")
     for name, device in chosen.items():
         failed, slow, total = [], [], 0.0
         slower = SLOW_LINEAR if device.own and name in LINEAR else SLOW
         with device.off() as options:
             for problem in [alone[device.own]] if device.own else common:
-                (solution, least), (found, seconds) = whole[problem.name], run(problem, options)
+                (solution, least), (found, seconds) = whole[problem.name], timed(problem, options)
                 total, limit = total + seconds, max(slower * least, least + NOTICED)
                 if solution.converged and not found.converged:
                     failed.append(problem.name)
                 # Other load makes single runs slow.
-                elif seconds > limit and run(problem, options)[1] > limit:
+                elif seconds > limit and timed(problem, options)[1] > limit:
                     slow.append(problem.name)
         needed = ", ".join([*failed, *slow][:6]) or "none"
         append(rows, name, len(failed), len(slow), round(total, 1), needed)
