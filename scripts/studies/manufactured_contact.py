@@ -67,20 +67,20 @@ class Sliding:
         """Return s."""
         return 0.1 * positive_part(x[0] - self.STICK) ** 4 * self._across(x)
 
-    def opening(self, x: Value) -> Value:
+    def normal_gap(self, x: Value) -> Value:
         """Return the distance that is left."""
         return 0.1 * positive_part(x[0] - self.END) ** 4
 
     def gap(self, x: Value) -> Value:
         """Return the gap to a foundation."""
-        return self.opening(x) - self._depth(x)
+        return self.normal_gap(x) - self._depth(x)
 
     def _across(self, x: Value) -> Value:
         return 1 + 0.4 * x[1] if self.dim == 3 else 1.0
 
     @staticmethod
     def _depth(x: Value) -> Value:
-        """Return u_z of the upper block at z = 0, less the opening of two blocks."""
+        """Return u_z of the upper block at z = 0, less the normal gap of two blocks."""
         return -0.02 * (1 + 0.5 * x[0] - 0.4 * x[0] ** 2)
 
     @property
@@ -94,7 +94,7 @@ class Sliding:
         common = 0.01 * ufl.sin(x[0]) if two else 0.0
         foot = [(self.slip(x) if block == 0 else 0.0) * e + common for e in self._along]
         if two and block == 0:
-            depth += self.opening(x)
+            depth += self.normal_gap(x)
         shear, lame = law.shear, law.bulk - 2 * law.shear / 3
         found = [
             foot[i]
