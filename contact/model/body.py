@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -342,7 +342,8 @@ class Body:
     Parameters
     ----------
     materials
-        A law of the stress, a `Material`, or several of them with their regions.
+        A law of the stress, a `Material`, or several of them with their regions; also by the name
+        `law`.
     fixed, loads
         Supports and loads, one or several; the attributes are tuples, as those below.
     piezo
@@ -371,22 +372,25 @@ class Body:
 
     def __init__(
         self,
-        materials: Law | Material | Sequence[Material],
-        fixed: Fixed | Sequence[Fixed],
+        materials: Law | Material | Sequence[Material] | None = None,
+        fixed: Fixed | Sequence[Fixed] = (),
         loads: Load | Sequence[Load] = (),
         piezo: Piezo | None = None,
         rigid: Rigid | Sequence[Rigid] = (),
         electrodes: Electrode | Sequence[Electrode] = (),
         elastic: Elastic | Sequence[Elastic] = (),
         bolts: Bolt | Sequence[Bolt] = (),
+        *,
+        law: Law | Material | Sequence[Material] | None = None,
     ) -> None:
-        if not isinstance(materials, Material | Sequence):
-            materials, piezo = Material(materials, piezo), None
+        given: Any = one_of("Body", materials=materials, law=law)
+        if not isinstance(given, Material | Sequence):
+            given, piezo = Material(given, piezo), None
         accepted = "a law, Material(law), or a list of Material(law, on=region)"
-        every = several("law", materials, Material, accepted)
-        expect("law", materials, accepted, every and piezo is None)
+        every = several("law", given, Material, accepted)
+        expect("law", given, accepted, every and piezo is None)
         fill(self, materials=every)
-        for name, given, kind in (
+        for name, parts, kind in (
             ("fixed", fixed, Fixed),
             ("loads", loads, Load),
             ("rigid", rigid, Rigid),
@@ -395,7 +399,7 @@ class Body:
             ("bolts", bolts, Bolt),
         ):
             words = f"{kind.__name__}(...), or a list of them"
-            fill(self, **{name: several(name, given, kind, words)})
+            fill(self, **{name: several(name, parts, kind, words)})
         if self.bolts and any(isinstance(one.law, HistoryLaw) for one in self.materials):
             raise InputError(
                 f"bolt on {self.bolts[0].on!r}: a material of the body has internal variables, as "

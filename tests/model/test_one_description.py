@@ -15,6 +15,7 @@ from contact import (
     Electric,
     Fixed,
     Friction,
+    InputError,
     Layer,
     Linear,
     Load,
@@ -129,3 +130,14 @@ def test_the_arguments_of_a_material_are_its_keys() -> None:
     """A key that `__init__` lacks would be one of the case file alone."""
     arguments = {*inspect.signature(Material.__init__).parameters} - {"self", "factor"}
     assert arguments == {*keys_of(Material)}
+
+
+def test_the_material_of_a_body_may_be_given_by_the_name_law() -> None:
+    """As it was before a body had a field `materials`."""
+    law, support = Linear(1.0, 0.3), Fixed("left", [0.0, 0.0])
+    assert Body(law=law, fixed=support) == Body(law, support)
+    assert replace(Body(law=law, fixed=support), fixed=()).law is law
+    with pytest.raises(InputError, match=r"Body: given .* accepted: one of materials, law"):
+        Body(law, support, law=law)
+    with pytest.raises(InputError, match="law: given None; accepted: Linear"):
+        Body(fixed=support)
