@@ -149,6 +149,15 @@ class Transformation:
         self.matrix = None if change is None else change.matrix
         self._inverse = None if change is None else change.inverse
 
+    def same(self, other: Transformation) -> bool:
+        """Tell whether C is that of another transformation of the same unknowns. Collective."""
+        change, motions = self.change, self.motions
+        if (change is None) != (other.change is None) or motions.shape != other.motions.shape:
+            return False
+        if change is not None and not change.matrix.equal(other.matrix):
+            return False
+        return float(summed(self.layout.comm, (motions != other.motions).nnz)) == 0
+
     def gathered(self, forces: Array) -> Array:
         """Return N_q^T f of owned forces, shape (owned,) or (owned, k). Collective."""
         return summed(self.layout.comm, self.motions.T @ forces)

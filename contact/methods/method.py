@@ -52,7 +52,10 @@ class Method(Protocol):
         """The last iterate: the end of a solve after a signal."""
 
     def set_load_step(self, problem: ContactProblem) -> None:
-        """Take another load step at the same place; factorisations remain, records start anew."""
+        """Take another load step; records start anew, factorisations remain.
+
+        Not so at another geometry whose linear systems have other unknowns: then all is anew.
+        """
 
     def solve(self, start: State | None = None) -> tuple[State, Outcome]:
         """Iterate from a guess, zero by default, until convergence or a limit. Collective.

@@ -219,7 +219,10 @@ class Newton:
         self.set_load_step(problem)
 
     def set_load_step(self, problem: ContactProblem) -> None:
-        """Take another load step of the same problem; factorisations remain."""
+        """Take another load step; see `Method`. Collective."""
+        if not problem.same_unknowns(self.problem):
+            self.problem = problem
+            return self.__post_init__()
         self.problem, self._modes = problem, replace(self._modes, problem=problem)
         self.recorder = Recorder(self.monitor)
         if self.condensed_steps.condensation is not None:

@@ -216,8 +216,7 @@ class ContactProblem:
     def with_geometry(self, geometries: Sequence[Geometry]) -> ContactProblem:
         """Return the problem with its contacts at another place, each as of `Placement.at`.
 
-        The contact nodes, the history and the time are the same; it has other matrices, so that a
-        method is made anew for it. Collective.
+        The contact nodes, the history and the time are the same. Collective.
         """
         other = self._with(geometries=tuple(geometries))
         return other.with_interface(other._interface().at(self.time, self.slip_history))
@@ -372,6 +371,20 @@ class ContactProblem:
             motions = unknowns.with_foundations(nodes.nodes, motion_at_constant_jump(nodes, body))
         change = None if nodes.coupling is None else nodes.coupling.change
         return Transformation(body.layout, change, motions, unknowns.free)
+
+    def same_unknowns(self, other: ContactProblem) -> bool:
+        """Tell whether the linear systems of another problem have the same unknowns y. Collective.
+
+        Those of load steps have; those at another geometry may have other jumps.
+        """
+        if self.nodes is other.nodes:
+            return True
+        nodes = self.interface.operator_nodes, other.interface.operator_nodes
+        same = self.comm.allreduce(np.array_equal(*nodes), op=MPI.LAND)
+        one, two = self.transformation, other.transformation
+        if not same or one is None or two is None:
+            return same and one is two
+        return one.same(two)
 
     def operator(
         self, *, symmetric: bool, counters: Counters, solver: str

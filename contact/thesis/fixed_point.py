@@ -85,7 +85,10 @@ class OuterLoop(ABC):
         self.set_load_step(self.problem)
 
     def set_load_step(self, problem: ContactProblem) -> None:
-        """Take another load step of the same problem; factorisations remain."""
+        """Take another load step; see `Method`. Collective."""
+        if not problem.same_unknowns(self.problem):
+            self.problem = problem
+            return self.__post_init__()
         self.problem, self.state = problem, problem.start()
         self.recorder = Recorder(self.monitor)
         self.bound: Array = np.zeros(problem.interface.nodes.gap.size)

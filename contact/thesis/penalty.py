@@ -366,7 +366,7 @@ class Penalty(OuterLoop):
         super().__post_init__()
 
     def set_load_step(self, problem: ContactProblem) -> None:
-        """Take another load step of the same problem; factorisations remain."""
+        """Take another load step; see `Method`. Collective."""
         super().set_load_step(problem)
         self._eps = regularisation(problem, self.options)
         for solver in self._solvers.values():

@@ -159,3 +159,21 @@ def test_solutions_are_those_of_the_moved_mesh(degree) -> None:
     assert outcome.converged and problem.nodes.maximum(expected.multipliers.contact) > 1e-3
     for x in states:
         np.testing.assert_allclose(x, expected.x, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", ["newton", "whole", "uzawa", "penalty"])
+def test_a_method_that_is_given_another_geometry_solves_there(name) -> None:
+    """It has the jumps of that geometry in its linear systems, not those of its first one."""
+    problem = pair(Blocks(2, 4, 6, gap=APART).domain(COMM), 1)
+    moved = problem.with_geometry([displaced(problem, slid)])
+    assert problem.same_unknowns(problem.at(0.5)) and not moved.same_unknowns(problem)
+    make = METHODS["newton" if name == "whole" else name]
+    options = OPTIONS["newton"](condense=False) if name == "whole" else OPTIONS[name]()
+    first, anew = make(problem, options, None), make(moved, options, None)
+    assert first.solve()[1].converged
+    first.set_load_step(moved)
+    (state, outcome), (expected, other) = first.solve(), anew.solve()
+    assert outcome.converged and other.converged
+    assert len(first.history) == len(anew.history)
+    np.testing.assert_allclose(state.x, expected.x, rtol=0, atol=1e-12)
