@@ -11,7 +11,7 @@ from contact.mesh.cells import SHAPES
 from contact.methods.options import NewtonOptions
 from forms.laws import SlipCoefficient
 from scripts.studies.robustness.__main__ import SMALL, judge, main
-from scripts.studies.robustness.ablation import DEVICES, LINEAR, own
+from scripts.studies.robustness.ablation import CLASSES, DEVICES, LINEAR, class_of
 from scripts.studies.robustness.check import Mesh, internal_forces, recheck
 from scripts.studies.robustness.problems import problems
 
@@ -146,6 +146,6 @@ def test_the_table_of_the_study(tmp_path, capsys):
 def test_devices_are_there_to_be_switched_off():
     for name, device in (DEVICES | LINEAR).items():
         assert all(hasattr(owner, part) for owner, part, _ in device.changes), name
-        assert not device.own or isinstance(own(device.own).case, Case)
+        assert not device.own or device.own in CLASSES
         with device.off() as options:
             assert isinstance(options, NewtonOptions)

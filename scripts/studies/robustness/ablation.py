@@ -1,9 +1,9 @@
 """Which problems need each device of solver and linear algebra: one of them off at a time.
 
 `make ablation ARGS="[--out DIR] [--coarse] [--devices NAME ..]"`. Problems are the plain and the
-hard ones, and Example 8.4 with a steep ramp; --coarse takes a tenth. A device whose row shows no
-problem, neither failed nor slow, is to go (CONTRIBUTING.md). Some have a problem of their own. Slow
-is 1.5 times as long; on one of its own a device of linear algebra is needed where it saves a tenth.
+hard ones, and Example 8.4 with a steep ramp; --coarse takes a tenth. Other devices have a class of
+problems of their own. One whose row shows no problem, neither failed nor slow, is to go
+(CONTRIBUTING.md). Slow is 1.5 times as long; of linear algebra, on a problem of its own, 1.1 times.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 from unittest.mock import patch
 
 import numpy as np
@@ -29,11 +30,10 @@ from contact.problem.residuals import evaluate
 from scripts.benchmarks import bench_one
 from scripts.cases import CASES, on_grid
 from scripts.reporting import Report, append, empty, parser
-from scripts.studies.robustness.one_body import Tables, case, clamp, elastic, grid, sliding
+from scripts.studies.robustness.one_body import Tables, case, elastic, grid, sliding
 from scripts.studies.robustness.problems import Problem, problems
 from tests.methods.test_belt import wall
-from tests.methods.test_nothing_touches import unloaded
-from tests.methods.test_slender import TIP, UNIFORM, beam
+from tests.methods.test_slender import TIP, UNIFORM, beam, on_the_ground
 
 #: Times as long as with the device, and seconds more, from which on a problem counts as slow.
 SLOW, NOTICED = 1.5, 0.1
@@ -48,20 +48,20 @@ def drawn(kind: str, name: str, seed: int | None = None, **mesh: Any) -> Problem
     if not mesh:
         return found
     tables = {**found.tables, "mesh": found.tables["mesh"] | mesh}
-    return Problem(name, tables, parse_case(tables, source=name))
+    return Problem(f"finer {name}", tables, parse_case(tables, source=name))
 
 
-def layer() -> Tables:
-    """Return a block on a layer that the load presses to 95 % of its limit."""
+def layer(part: float) -> Tables:
+    """Return a block on a layer that the load presses to a part of its limit."""
     law = {"law": "compliance", "stiffness": 500.0, "limit": 3e-3, "layer": np.inf}
-    load = {"on": "top", "pressure": 0.95 * 500.0 * 3e-3}
+    load = {"on": "top", "pressure": part * 500.0 * 3e-3}
     fixed, mesh = [{"on": "left", "symmetry": "x"}], grid([2.0, 1.0], [6, 3])
     return case(mesh, elastic(1000.0, 0.0), fixed, {"on": "bottom", **law}, sliding(0.0), load)
 
 
-def soft_block() -> Tables:
+def soft_block(stiffness: float) -> Tables:
     """Return a block on a layer that is stiffer, solved by multigrid."""
-    law = {"law": "compliance", "stiffness": 1500.0, "limit": 2e-3, "layer": 0.05}
+    law = {"law": "compliance", "stiffness": stiffness, "limit": 3.0 / stiffness, "layer": 0.05}
     fixed = [{"on": "left", "symmetry": "x"}, {"on": "back", "symmetry": "y"}]
     return case(
         grid([2.0, 1.0, 1.0], [16, 8, 8]), elastic(6.0, 0.05), fixed, {"on": "bottom", **law},
@@ -69,10 +69,10 @@ def soft_block() -> Tables:
     )  # fmt: skip
 
 
-def steep(cells: tuple[int, int] = (96, 16), k_e: str = "0.6", delta: str = "83.3333") -> Case:
+def steep() -> Case:
     """Return Example 8.4 with a steep ramp of the conductivity."""
-    changes = "solver.method=newton", f"electric.k_e={k_e}", f"electric.delta={delta}"
-    return on_grid("compliance-8-4", cells, *changes)
+    changes = "solver.method=newton", "electric.k_e=0.6", "electric.delta=83.3333"
+    return on_grid("compliance-8-4", (96, 16), *changes)
 
 
 def pulled_strip() -> Tables:
@@ -81,71 +81,74 @@ def pulled_strip() -> Tables:
     return {**beam(100.0, [1600, 16], {}, 0.0, 0.3), "load": [*loads]}
 
 
-def two_spheres() -> Tables:
-    """Return a ball that another one alone holds, pushed aside."""
-    mesh = {"generator": "two_spheres", "quarters": 2, "size": 25.0}
-    mesh |= {"contact_size": 2.5, "contact_width": 5.0}
-    fixed = {"on": "symmetry_y", "displacement": ["free", 0.0, "free"]}
-    contact = {"on": "upper_round", "against": "lower_round"}
-    return case(
-        mesh, elastic(20e3), [fixed, *clamp("lower_cut", dim=3)], contact, sliding(0.3),
-        {"on": "upper_cut", "traction": [0.5, 0.0, -8.0]}, solver={"linear": "iterative"},
-    )  # fmt: skip
+Made: TypeAlias = Problem | Case | Tables
 
 
-def piezoelectric_pair() -> Tables:
-    """Return two piezoelectric bodies below a plate, with a current across both contacts."""
-    coupling = {"e31": -0.3, "e33": 0.8, "e15": 0.6, "beta11": 1.0, "beta33": 0.9}
-    return {
-        "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.22},
-        "material": elastic(piezo=coupling),
-        "fixed": [{"on": "lower_left", "displacement": [0.0, "free"]}],
-        "rigid": [{"on": "upper_top", "displacement": [0.002, "free"], "force": [0.0, -0.02]}],
-        "electrode": [{"on": "upper_top", "charge": 0.003}],
-        "contact": [
-            {"on": "upper_bottom", "against": "lower_top", "friction": sliding(0.3),
-             "electric": {"k_e": 2.0, "delta": 5.0}},
-            {"on": "lower_bottom", "friction": sliding(0.1),
-             "electric": {"k_e": 1.0, "delta": 5.0}},
-        ],
-        "solver": {"linear": "iterative", "tolerance": 1e-9},
-    }  # fmt: skip
+def beams() -> Iterator[Made]:
+    """Make slender bodies that touch a stop, on one mesh as of a file, and one on the ground."""
+    for degree, mu, cells in product((1, 2), (0.0, 0.3), ([400, 4], [800, 8])):
+        yield beam(100.0, cells, TIP, 0.5, mu, solver={"nested": False}, space={"degree": degree})
+    yield beam(100.0, [1600, 16], TIP, 0.5, 0.3, solver={"nested": False})
+    yield on_the_ground()
 
 
-#: Problems that a device alone solves, or solves in time.
-OWN: dict[str, Callable[[], Problem | Case | Tables]] = {
-    # A cantilever whose tip touches a stop, on one mesh alone, as of a file.
-    "stop": partial(beam, 100.0, [1600, 16], TIP, 0.5, 0.3, solver={"nested": False}),
+def finer(*chosen: tuple[str, list[int]]) -> Iterator[Made]:
+    """Make plain problems on finer meshes."""
+    for name, cells in chosen:
+        yield drawn("plain", name, cells=cells)
+
+
+def of_kind(kind: str, *names: str, seed: int | None = None) -> Iterator[Made]:
+    """Draw random problems by their names."""
+    for name in names:
+        yield drawn(kind, name, seed)
+
+
+def single(made: Callable[[], Made]) -> Callable[[], Iterator[Made]]:
+    """Return a class of one problem."""
+    return lambda: iter([made()])
+
+
+#: Classes of problems beside the common ones, for devices that these do not need.
+CLASSES: dict[str, Callable[[], Iterator[Made]]] = {
+    "beams": beams,
+    # Bodies that roll, that part, and that jaws hold (docs/robustness.md).
+    "rings": partial(of_kind, "bodies", "rings-0", "rings-5", "rings-6", "rings-9", "rings-20"),
+    "out of loads": partial(of_kind, "bodies", "rings-12", "rings-23", "stacks-45"),
+    "snap fits": partial(of_kind, "bodies", *(f"snap_fits-{k}" for k in (0, 1, 2, 17, 19, 24))),
+    "wedges": partial(of_kind, "bodies", "wedges-16", seed=211),
+    "belts": partial(of_kind, "held", "belt-1", "belt-8", "belt-9"),
+    "walls": lambda: (wall(2, load) for load in (1.01, 1.05, 1.2)),
+    "finer": partial(
+        finer, ("bar-24", [128, 32]), ("bar-67", [640, 160]), ("piezo-7", [64, 32]),
+        ("piezo-32", [128, 64]), ("block-4", [16, 8, 8]), ("block-33", [24, 12, 12]),
+    ),
+    # Near the limit of the layer.
+    "layers": lambda: (layer(part) for part in (0.9, 0.95, 0.99)),
+    # Layers that are stiffer than the body, solved by multigrid.
+    "stiff layers": lambda: (soft_block(k) for k in (500.0, 1500.0, 5000.0)),
+    "pulled strip": single(pulled_strip),
     # A cantilever most of which lies on the ground, and that is condensed.
-    "lying": partial(beam, 100.0, [500, 20], UNIFORM, 0.5, space={"degree": 2}),
-    "pulled strip": pulled_strip,
-    "two spheres": two_spheres,
-    "piezoelectric pair": piezoelectric_pair,
-    "layer": layer,
-    # A belt that friction alone holds.
-    "belt": partial(drawn, "held", "belt-1"),
-    "finer block-33": partial(drawn, "plain", "block-33", cells=[24, 12, 12]),
-    "finer bar-67": partial(drawn, "plain", "bar-67", cells=[640, 160]),
-    "wall": partial(wall, 2, 1.01),
-    # A wedge between two planes, which bounds by interior points alone do not solve.
-    "wedge": partial(drawn, "bodies", "wedges-16", 211),
-    "soft block": soft_block,
-    # Rings between plates, out of whose loads they roll.
-    "rings": partial(drawn, "bodies", "rings-23"),
-    "unloaded": partial(unloaded, "supports"),
-    "conducting": partial(steep, (48, 8), "6.0", "8.3333"),
-    "block-16": partial(bench_one.block, 16),
-    "plane-256": partial(bench_one.problem_case, 2, 256, "solver.nested=false"),
-    "piezo-column": partial(load_case, CASES / "piezo-column.toml", ["mesh.cells=[20, 20, 40]"]),
-}
+    "lying": single(partial(beam, 100.0, [500, 20], UNIFORM, 0.5, space={"degree": 2})),
+    # Those of the benchmark (docs/benchmarks.md).
+    "block-16": single(partial(bench_one.block, 16)),
+    "plane-256": single(partial(bench_one.problem_case, 2, 256, "solver.nested=false")),
+    "piezo-column": single(
+        partial(load_case, CASES / "piezo-column.toml", ["mesh.cells=[20, 20, 40]"])
+    ),
+}  # fmt: skip
 
 
-def own(name: str) -> Problem:
-    """Return a problem of `OWN`."""
-    made = OWN[name]()
-    if isinstance(made, Problem):
-        return made
-    return Problem(name, {}, made if isinstance(made, Case) else parse_case(made, source=name))
+def class_of(name: str) -> list[Problem]:
+    """Return the problems of one of the `CLASSES`."""
+    problems = []
+    for number, made in enumerate(CLASSES[name]()):
+        if not isinstance(made, Problem):
+            title = f"{name} {number}"
+            case = made if isinstance(made, Case) else parse_case(made, source=title)
+            made = Problem(title, {}, case)
+        problems.append(made)
+    return problems
 
 
 @dataclass(frozen=True)
@@ -154,7 +157,7 @@ class Device:
 
     #: Its replacements: owner, name, value.
     changes: tuple[tuple[Any, str, Any], ...] = ()
-    #: The only problem that is solved without it, of `OWN`; none for all.
+    #: The class of problems that need it, of `CLASSES`; none for the common ones.
     own: str = ""
     #: Option that switches it off.
     option: tuple[str, Any] | None = None
@@ -198,36 +201,32 @@ def _never(*_: Any) -> bool:
 DEVICES = {
     "interior point": _off(fallbacks, "interior_point", _no_fallback),
     "updates of the friction bound": _off(interior_point, "UPDATES", 1),
-    "friction bound of Newton's last steps": _off(interior_point, "PROGRESS", 0.0, "wedge"),
-    "limit analysis of the friction bound": _off(UnconstrainedModes, "overloaded", _never, "wall"),
-    "rigid motion to a state without contact": _off(fallbacks, "rigid_motion", own="rings"),
+    "friction bound of Newton's last steps": _off(interior_point, "PROGRESS", 0.0, "wedges"),
+    "limit analysis of the friction bound": _off(UnconstrainedModes, "overloaded", _never, "walls"),
+    "rigid motion to a state without contact": _off(fallbacks, "rigid_motion", own="out of loads"),
     # Guyan 1965
     "steps on the condensed body at last": _off(fallbacks, "on_condensed_body"),
-    "secants of a layer": _off(fallbacks, "layer_secants", own="layer"),
-    "proximal points": _off(fallbacks, "proximal_points", own="belt"),
+    "secants of a layer": _off(fallbacks, "layer_secants", own="layers"),
+    "proximal points": _off(fallbacks, "proximal_points", own="belts"),
     "continuation in the conductivity": _off(fallbacks, "conductivity_continuation"),
     "estimate of the stiffness from the first step": _off(
-        semismooth, "_overestimates_stiffness", _never, "stop"
+        semismooth, "_overestimates_stiffness", _never, "beams"
     ),
-    "Levenberg-Marquardt regularisation": _off(safeguards, "REGULARISATION", 0.0, "two spheres"),
-    "forcing term that tightens": _off(newton_step, "STAGNANT", 10**9, "piezoelectric pair"),
+    "Levenberg-Marquardt regularisation": _off(safeguards, "REGULARISATION", 0.0, "rings"),
     "layer linearised where its law is met": _off(
-        newton_step, "linearised_layer", _linearised(newton_step.linearised_layer), "soft block"
+        newton_step, "linearised_layer", _linearised(newton_step.linearised_layer), "stiff layers"
     ),
-    "limited softening": Device((), "finer block-33", ("softening", float("inf"))),
+    "limited softening": Device((), "finer", ("softening", float("inf"))),
     "sliding nodes at their bound": _off(
-        safeguards, "at_bound", lambda _, friction, *__: friction, "finer bar-67"
+        safeguards, "at_bound", lambda _, friction, *__: friction, "finer"
     ),
     "derivative of the conductivity by the gap": _off(
         safeguards.ConductivityDerivative, "__call__", _never
     ),
-    "stagnation limit of the continuation": _off(
-        fallbacks, "CONTINUATION_LIMIT", None, "conducting"
-    ),
     "zero displacement where nothing acts": _off(
-        semismooth.ConvergenceMonitor, "_loss_of_contact", own="unloaded"
+        semismooth.ConvergenceMonitor, "_loss_of_contact", own="snap fits"
     ),
-    "working set of contact nodes, from all open": _off(fallbacks, "all_open", own="stop"),
+    "working set of contact nodes, from all open": _off(fallbacks, "all_open", own="beams"),
 }
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
@@ -280,16 +279,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     }
     common = [one for kind in ("plain", "hard") for one in problems(kind, coarse=given.coarse)]
     common.append(Problem("compliance-8-4", {}, steep()))
-    alone = {name: own(name) for name in {device.own for device in chosen.values()} - {""}}
-    for problem in alone.values():
+    owned = {name: class_of(name) for name in {device.own for device in chosen.values()} - {""}}
+    every = [problem for problems in owned.values() for problem in problems]
+    for problem in every:
         timed(problem, NewtonOptions())  # loads its forms
-    whole = {one.name: timed(one, NewtonOptions()) for one in [*common, *alone.values()]}
+    whole = {one.name: timed(one, NewtonOptions()) for one in [*common, *every]}
     rows = empty("device", "failed", "slow", "seconds", "problems that need it")
     for name, device in chosen.items():
         failed, slow, total = [], [], 0.0
         slower = SLOW_LINEAR if device.own and name in LINEAR else SLOW
         with device.off() as options:
-            for problem in [alone[device.own]] if device.own else common:
+            for problem in owned.get(device.own, common):
                 (solution, least), (found, seconds) = whole[problem.name], timed(problem, options)
                 total, limit = total + seconds, max(slower * least, least + NOTICED)
                 if solution.converged and not found.converged:
