@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Case, build_problem, parse_case, solve
+from contact import build_problem, parse_case, solve
 from contact.mesh.cells import SHAPES
 from contact.methods.options import NewtonOptions
 from forms.laws import SlipCoefficient
@@ -149,3 +149,9 @@ def test_devices_are_there_to_be_switched_off():
         assert not device.own or device.own in CLASSES
         with device.off() as options:
             assert isinstance(options, NewtonOptions)
+
+
+def test_classes_of_the_ablation_have_problems_of_different_names() -> None:
+    names = [problem.name for name in CLASSES for problem in class_of(name)]
+    names += [problem.name for kind in ("plain", "hard") for problem in problems(kind)]
+    assert len(names) == len({*names})
