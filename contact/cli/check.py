@@ -68,7 +68,7 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if comm.rank == 0:
         print(text)
     if options.plot:
-        from contact.cli.setup import save_setup  # matplotlib takes a while to load
+        from contact.plot.setup import save_setup  # matplotlib takes a while to load
 
         for path in save_setup(case, problem, Path.cwd()):
             print(f"# set-up: {path.name}")

@@ -1,1 +1,1 @@
-"""Figures of a solution: contact, deformed body, potential."""
+"""Figures of a solution, from its files (contact, body, potential), and of the set-up of a case."""

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from mpi4py import MPI
 
 from contact import build_problem, load_case
-from contact.cli.setup import draw_setup
+from contact.plot.setup import draw_setup
 from scripts.cases import CASES
 from scripts.reporting import Report, append, empty
 

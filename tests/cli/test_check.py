@@ -14,7 +14,7 @@ from contact.case.build import build_problem
 from contact.case.file import load_case, parse_case
 from contact.cli.check import describe, expectations
 from contact.cli.main import main
-from contact.cli.setup import draw_setup
+from contact.plot.setup import draw_setup
 from scripts.cases import CASES
 from tests.problems.bar import changed
 from tests.problems.clamped import clamped
@@ -218,7 +218,7 @@ def test_the_picture_in_3d_has_all_of_the_arrows(monkeypatch, side):
         seen.append(camera)
         add(Plotter())
 
-    monkeypatch.setattr("contact.cli.setup.render", render)
+    monkeypatch.setattr("contact.plot.setup.render", render)
     data = {
         "mesh": {"generator": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]},
         "material": {"young": 1.0, "poisson": 0.3},

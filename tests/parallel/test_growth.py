@@ -15,10 +15,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact import build_problem, load_case, parse_case
-from contact.cli.setup import draw_setup
 from contact.history import BodyState
 from contact.linear.layout import times
 from contact.linear.transformation import TransformedBulk
+from contact.plot.setup import draw_setup
 from scripts.benchmarks.weak import costs, problem_of
 from scripts.cases import CASES
 from tests.problems.bar import changed
