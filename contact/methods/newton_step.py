@@ -38,9 +38,13 @@ from contact.problem.state import State
 from contact.ranks import summed
 from contact.typing import Array
 
-#: Forcing term of inexact Newton. One by the residuals (Eisenstat and Walker) would ask for
+#: First forcing term of inexact Newton. One by the residuals (Eisenstat and Walker) would ask for
 #: more digits on finer meshes.
 FORCING = 1e-2
+
+#: Steps without progress after which the forcing term is multiplied by `REDUCTION`: with two digits
+#: the active set may cycle. Its least value is the tolerance.
+STAGNANT, REDUCTION = 3, 1e-2
 
 #: Ratio of the equilibrium residual to the largest one below which the stiffness of the last step
 #: is reused: the error is in contact and friction.
@@ -89,9 +93,10 @@ class NewtonStep:
         self.begin()
 
     def begin(self) -> None:
-        """Begin another iteration: the conductivity derivative anew."""
+        """Begin another iteration: forcing term and conductivity derivative anew."""
         self._conductivity_derivative = ConductivityDerivative()
         self._assembled = False
+        self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
     def rejected(self, residual: float) -> bool:
         """Tell whether the last step raised the residual by a derivative that may be left out.
@@ -99,6 +104,15 @@ class NewtonStep:
         It is then to be taken again, without the derivative of psi by the gap.
         """
         return self._conductivity_derivative.worsened(residual)
+
+    def _forcing_term(self, residual: float) -> float:
+        """Return the forcing term of a step from the residual before it."""
+        self._stagnant = 0 if residual < self._nearest else self._stagnant + 1
+        self._nearest = min(self._nearest, residual)
+        if self._stagnant >= STAGNANT:
+            self._stagnant = 0
+            self._forcing = max(self._forcing * REDUCTION, self.options.tolerance)
+        return self._forcing
 
     @property
     def operator(self) -> Operator:
@@ -150,8 +164,9 @@ class NewtonStep:
         laws = self._linearise(problem.interface, state, largest)
         self._update(problem, iterate, laws, tangent)
         residual = _residual(problem, iterate, laws)
+        forcing = None if exact else self._forcing_term(largest)
         try:
-            increment = self.operator.solve(-residual, None if exact else FORCING)
+            increment = self.operator.solve(-residual, forcing)
         except SingularError:
             if body.linear or (self._underconstrained and state.active_set is None):
                 raise

@@ -254,6 +254,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         "10^4 \\max(c, \\kappa)": options.gamma == 1e4,
         "below [1/10] of the\n   largest one": newton_step.SMALL == 0.1,
         "the forcing term [10⁻²]": newton_step.FORCING == 1e-2,
+        "each three steps": newton_step.STAGNANT == 3,
         "[10^{-2}]\\,\\kappa$ is added": safeguards.REGULARISATION == 1e-2,
         "tolerance is [10⁻³] of the": newton.CONTACT_PART == 1e-3,
         "has not fallen to [1/20]": newton.UNSOLVED == 0.05,

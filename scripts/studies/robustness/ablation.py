@@ -81,6 +81,25 @@ def pulled_strip() -> Tables:
     return {**beam(100.0, [1600, 16], {}, 0.0, 0.3), "load": [*loads]}
 
 
+def charged_pair(size: float) -> Tables:
+    """Return two piezoelectric bodies below a plate, with a current across both contacts."""
+    coupling = {"e31": -0.3, "e33": 0.8, "e15": 0.6, "beta11": 1.0, "beta33": 0.9}
+    return {
+        "mesh": {"generator": "two_blocks", "lower_size": size, "upper_size": 0.73 * size},
+        "material": elastic(piezo=coupling),
+        "fixed": [{"on": "lower_left", "displacement": [0.0, "free"]}],
+        "rigid": [{"on": "upper_top", "displacement": [0.002, "free"], "force": [0.0, -0.02]}],
+        "electrode": [{"on": "upper_top", "charge": 0.003}],
+        "contact": [
+            {"on": "upper_bottom", "against": "lower_top", "friction": sliding(0.3),
+             "electric": {"k_e": 2.0, "delta": 5.0}},
+            {"on": "lower_bottom", "friction": sliding(0.1),
+             "electric": {"k_e": 1.0, "delta": 5.0}},
+        ],
+        "solver": {"linear": "iterative", "tolerance": 1e-9},
+    }  # fmt: skip
+
+
 Made: TypeAlias = Problem | Case | Tables
 
 
@@ -127,6 +146,7 @@ CLASSES: dict[str, Callable[[], Iterator[Made]]] = {
     "layers": lambda: (layer(part) for part in (0.9, 0.95, 0.99)),
     # Layers that are stiffer than the body, solved by multigrid.
     "stiff layers": lambda: (soft_block(k) for k in (500.0, 1500.0, 5000.0)),
+    "charged pairs": lambda: (charged_pair(size) for size in (0.3, 0.24, 0.18, 0.15, 0.12)),
     "pulled strip": single(pulled_strip),
     # A cantilever most of which lies on the ground, and that is condensed.
     "lying": single(partial(beam, 100.0, [500, 20], UNIFORM, 0.5, space={"degree": 2})),
@@ -213,6 +233,7 @@ DEVICES = {
         semismooth, "_overestimates_stiffness", _never, "beams"
     ),
     "Levenberg-Marquardt regularisation": _off(safeguards, "REGULARISATION", 0.0, "rings"),
+    "forcing term that tightens": _off(newton_step, "STAGNANT", 10**9, "charged pairs"),
     "layer linearised where its law is met": _off(
         newton_step, "linearised_layer", _linearised(newton_step.linearised_layer), "stiff layers"
     ),
