@@ -223,7 +223,10 @@ class Newton:
         if not problem.same_unknowns(self.problem):
             self.problem = problem
             return self.__post_init__()
-        self.problem, self._modes = problem, replace(self._modes, problem=problem)
+        # Another geometry has other normals.
+        same = problem.nodes is self.problem.nodes
+        modes = replace(self._modes, problem=problem) if same else UnconstrainedModes.of(problem)
+        self.problem, self._modes = problem, modes
         self.recorder = Recorder(self.monitor)
         if self.condensed_steps.condensation is not None:
             self.condensed_steps.condensation.set_load_step(problem)

@@ -66,7 +66,8 @@ class UnconstrainedModes:
     """Constraints of the rigid-body modes of the whole problem at a load step. Collective."""
 
     problem: ContactProblem
-    #: Groups of bodies with modes that their supports do not constrain, the same in all load steps.
+    #: Groups of bodies with modes that their supports do not constrain, the same in all load steps
+    #: at one geometry.
     groups: tuple[Group, ...]
 
     @staticmethod

@@ -201,6 +201,7 @@ class Contact(Described):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        self.require(type(self.rigid) in (Motion, type(None)), "rigid", "Motion(...)")
         shape = None if self.foundation is None or not self.foundation.is_shape else self.foundation
         given = {"against": self.against, "foundation": shape, "rigid": self.rigid, "gap": self.gap}
         for one, other in (("against", "foundation"), ("against", "rigid"), ("gap", "foundation")):

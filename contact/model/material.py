@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 import numpy as np
 from dolfinx.fem import Function
 from numpy.typing import NDArray
-from pydantic import Field, Tag, ValidationError, model_validator
+from pydantic import AfterValidator, Field, Tag, ValidationError, model_validator
 
 from contact.arguments import CONSTANTS as NUMBERS
 from contact.arguments import expect, is_law, several
@@ -180,6 +180,11 @@ OWN_LAW = (
 )
 
 
+def _own(factor: Any) -> Any:
+    """Return a factor that does not change with the user's Function."""
+    return factor.copy() if isinstance(factor, Function) else factor
+
+
 class Material(Described):
     """`[material]`: isotropic material of Hencky or of flow theory (`j2`), or a crystal.
 
@@ -251,7 +256,7 @@ class Material(Described):
         None, alias="piezo"
     )
     """Piezoelectric constants, `[material.piezo]`. Absent: mechanical only."""
-    factor: Internal[StaticValue | None] = None
+    factor: Internal[Annotated[StaticValue, AfterValidator(_own)] | None] = None
     """A function of position > 0 that its stresses are multiplied by; None for 1."""
 
     def __init__(
@@ -292,10 +297,14 @@ class Material(Described):
         fits = isinstance(piezo, PiezoTensors | Mapping | None)
         expect("piezo", piezo, "Piezo(...), a table of constants, or None", fits)
         names = several("on", on, str, "the name of a region, or a list of names")
-        own = factor.copy() if isinstance(factor, Function) else factor
-        super().__init__(law=law, piezo=piezo, on=names or None, factor=own, **keys)
-        fits = factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))
-        expect("factor", factor, "a material without coupling and internal variables", fits)
+        super().__init__(law=law, piezo=piezo, on=names or None, factor=factor, **keys)
+
+    @model_validator(mode="after")
+    def _check_factor(self) -> Self:
+        fits = self.factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))
+        accepted = "a material without coupling and internal variables"
+        expect("factor", self.factor, accepted, fits)
+        return self
 
     @cached_property
     def law(self) -> Law:

@@ -85,9 +85,9 @@ CONFIG = ConfigDict(
     use_attribute_docstrings=True,
 )
 
-#: The contexts of a description that is made in Python, where values may be objects, and of a copy,
-#: whose amplitudes may have names too: it may be of a case.
-IN_PYTHON, IN_COPY = {"python": True}, {"python": True, "copy": True}
+#: The context of a description that is made in Python, where values may be objects. In that of a
+#: copy "tables" are those to come that are no values of a user: amplitudes may have names there.
+IN_PYTHON = {"python": True}
 
 
 def in_python(info: ValidationInfo) -> bool:
@@ -160,10 +160,11 @@ class Section(BaseModel):
             given[keys.get(name, name)] = value
             if name not in {*keys, *keys.values()}:
                 known = keys_of(type(self))
-                error = unknown(name, known, self.hints.get(name, ""))
+                error = unknown(str(name), known, self.hints.get(name, ""))
                 raise error.within(f"{self._called}: ")
+        context = IN_PYTHON | {"tables": [given] if isinstance(self, Described) else []}
         try:
-            made.__pydantic_validator__.validate_python(given, self_instance=made, context=IN_COPY)
+            made.__pydantic_validator__.validate_python(given, self_instance=made, context=context)
         except ValidationError as error:
             raise describe(error, self._called) from None
         object.__setattr__(made, "__pydantic_private__", private)
@@ -194,6 +195,17 @@ class Described(Section):
         # Tables are read without `__init__`, so that messages name their keys.
         cls.__pydantic_custom_init__ = False
         document(cls)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_tables(cls, given: Any, info: ValidationInfo) -> Any:
+        """Refuse tables in a copy: units of a case file, as degrees, are not those of Python."""
+        tables = (info.context or {}).get("tables")
+        if isinstance(given, Mapping) and tables is not None:
+            if not tables:
+                raise fault("", Words("given a table"), f"{cls.__name__}(...)")
+            tables.pop()
+        return given
 
     def __init__(self, **given: Any) -> None:
         try:

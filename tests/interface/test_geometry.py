@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Body, Contact, Fixed, GapFunction, Motion, Sphere
+from contact import Body, Contact, Fixed, Friction, GapFunction, Motion, Sphere
 from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
+from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.blocks import Blocks
@@ -177,3 +178,21 @@ def test_a_method_that_is_given_another_geometry_solves_there(name) -> None:
     assert outcome.converged and other.converged
     assert len(first.history) == len(anew.history)
     np.testing.assert_allclose(state.x, expected.x, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parallel
+def test_rigid_body_modes_of_a_method_are_those_of_its_geometry() -> None:
+    """Limit analysis in a load step at another geometry had the normals of the first one."""
+    domain = Blocks(2, 3, 4).domain(COMM)
+    ball = Sphere(centre=(0.5, -3.0), radius=2.5)
+    body = Body(Linear(1.0, 0.3), Fixed("top", [constant(0.0, 2), "free"]))
+    problem = ContactProblem(domain, body, Contact("bottom", ball), Friction(mu=0.3))
+    moved = problem.with_geometry([displaced(problem, shifted)])
+    method = METHODS["newton"](problem, OPTIONS["newton"](), None)
+    method.set_load_step(moved)
+    moved_anew, first = (UnconstrainedModes.of(one).groups for one in (moved, problem))
+    off = 0.0
+    for group, anew, before in zip(method.semismooth.modes.groups, moved_anew, first, strict=True):
+        np.testing.assert_array_equal(group.normal, anew.normal)
+        off = max(off, np.abs(anew.normal - before.normal).max(initial=0.0))
+    assert COMM.allreduce(off, op=MPI.MAX) > 1e-3

@@ -16,6 +16,8 @@ from contact import (
     Motion,
     NewtonOptions,
     Plane,
+    Rigid,
+    make_material,
     parse_case,
 )
 from contact.model.section import Section
@@ -74,3 +76,37 @@ def test_a_copy_of_a_case_has_its_name_and_those_of_amplitudes() -> None:
         case.model_copy(update={"load": (unknown,)})
     with pytest.raises(InputError, match=r"amplitude: given 'press'"):
         _ = LOAD.model_copy(update={"amplitude": "press"}).factor
+
+
+def test_copies_of_materials_have_the_rules_of_new_ones() -> None:
+    """A factor of a coupled material was taken, and multiplied its stiffness alone."""
+    coupled = make_material(2, name="PZT-4", units="GPa", poling=90)
+    plastic = make_material(2, law="j2", young=10.0, poisson=0.3, yield_stress=1e-3)
+    for material in (coupled, plastic):
+        with pytest.raises(InputError, match=r"factor: .*a material without coupling"):
+            material.model_copy(update={"factor": 2.0})
+        with pytest.raises(InputError, match=r"factor: .*a material without coupling"):
+            Material(material.law, material.piezo, factor=2.0)
+
+
+def test_tables_are_no_values_of_a_copy() -> None:
+    """Their rotations, in degrees in a case file, were taken in radians."""
+    table = {"on": "right", "rotation": 10.0, "centre": [0.0, 0.0]}
+    case = parse_case(changed())
+    with pytest.raises(InputError, match=r"rigid\.0: given a table; accepted: Rigid\(\.\.\.\)"):
+        case.model_copy(update={"rigid": [table]})
+    motion = {"displacement": [0.0, 0.1]}
+    with pytest.raises(InputError, match=r"rigid: given a table; accepted: Motion\(\.\.\.\)"):
+        Contact("bottom").model_copy(update={"rigid": motion})
+    assert Contact("bottom").model_copy(update={"rigid": Motion([0.0, 0.1])}).rigid is not None
+
+
+def test_a_foundation_moves_by_a_motion_not_as_a_rigid_part() -> None:
+    """The nodes of the contact part were tied to it."""
+    with pytest.raises(InputError, match=r"rigid: .*accepted: Motion"):
+        Contact("bottom", 0.01, rigid=Rigid("left", Motion([0.0, 0.1])))
+
+
+def test_names_that_are_no_texts_are_refused() -> None:
+    with pytest.raises(InputError, match="1"):
+        Contact("bottom").model_copy(update={1: 1})
