@@ -223,10 +223,12 @@ class Newton:
         if not problem.same_unknowns(self.problem):
             self.problem = problem
             return self.__post_init__()
-        # Another geometry has other normals.
-        same = problem.nodes is self.problem.nodes
-        modes = replace(self._modes, problem=problem) if same else UnconstrainedModes.of(problem)
-        self.problem, self._modes = problem, modes
+        if problem.nodes is self.problem.nodes:
+            self._modes = replace(self._modes, problem=problem)
+        else:  # normals and gaps of another geometry
+            self._modes = UnconstrainedModes.of(problem)
+            self._step.underconstrained = not self._modes.constrained_undeformed
+        self.problem = problem
         self.recorder = Recorder(self.monitor)
         if self.condensed_steps.condensation is not None:
             self.condensed_steps.condensation.set_load_step(problem)

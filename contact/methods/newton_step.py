@@ -82,15 +82,18 @@ class NewtonStep:
         counters: Counters,
         underconstrained: bool = False,
     ) -> None:
-        self._underconstrained = underconstrained
-        fault = (
-            "no contact constrains the body" if underconstrained else "the stiffness is singular"
-        )
-        self.fault = f"{fault} at that displacement"
+        self.underconstrained = underconstrained
         self.options, self.parameters = options, parameters
         self._problem, self._counters = problem, counters
         self._operator: Operator | None = None
         self.begin()
+
+    @property
+    def fault(self) -> str:
+        """Reason of an end where the matrix is singular."""
+        body = "no contact constrains the body"
+        fault = body if self.underconstrained else "the stiffness is singular"
+        return f"{fault} at that displacement"
 
     def begin(self) -> None:
         """Begin another iteration: forcing term and conductivity derivative anew."""
@@ -168,7 +171,7 @@ class NewtonStep:
         try:
             increment = self.operator.solve(-residual, forcing)
         except SingularError:
-            if body.linear or (self._underconstrained and state.active_set is None):
+            if body.linear or (self.underconstrained and state.active_set is None):
                 raise
             return None
         return _moved(problem, state, laws, increment)
@@ -208,7 +211,7 @@ class NewtonStep:
         interface, body = problem.interface, problem.body
         state, residuals = iterate.state, iterate.residuals
         blocks = laws.blocks + laws.layer + laws.charge
-        if self._underconstrained and not laws.unchanged:
+        if self.underconstrained and not laws.unchanged:
             blocks[:, : body.dim, : body.dim] += regularisation(
                 interface, residuals.significant, self.parameters.nodal_stiffness
             )

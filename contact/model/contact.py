@@ -20,7 +20,7 @@ from contact.model.foundation import Conductor, Electric, Layer
 from contact.model.friction import Friction
 from contact.model.messages import either
 from contact.model.obstacle import SHAPES, GapFunction, Obstacle, Shape
-from contact.model.rigid import Motion
+from contact.model.rigid import Motion, Rigid
 from contact.model.section import Described, Direction, Part, StaticValue
 from contact.settings import (
     Accepted,
@@ -201,7 +201,7 @@ class Contact(Described):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        self.require(type(self.rigid) in (Motion, type(None)), "rigid", "Motion(...)")
+        self.require(not isinstance(self.rigid, Rigid), "rigid", "Motion(...)")
         shape = None if self.foundation is None or not self.foundation.is_shape else self.foundation
         given = {"against": self.against, "foundation": shape, "rigid": self.rigid, "gap": self.gap}
         for one, other in (("against", "foundation"), ("against", "rigid"), ("gap", "foundation")):

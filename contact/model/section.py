@@ -85,8 +85,8 @@ CONFIG = ConfigDict(
     use_attribute_docstrings=True,
 )
 
-#: The context of a description that is made in Python, where values may be objects. In that of a
-#: copy "tables" are those to come that are no values of a user: amplitudes may have names there.
+#: The context of a description that is made in Python, where values may be objects. A copy has
+#: "tables" besides: its own values, and no other table; amplitudes may have names there.
 IN_PYTHON = {"python": True}
 
 
