@@ -65,6 +65,9 @@ FACTOR, LEAST_FACTOR = 1e3, 1.2
 #: First part of k_e.
 FIRST_PART = FACTOR**-3
 
+#: Stagnation limit in a continuation; Example 8.4 with ten times its k_e needs it.
+CONTINUATION_LIMIT = 20
+
 #: Proximal points: first stiffness of the bed over c, and its factors after success and failure.
 PROXIMAL_STIFFNESS, SOFTER, STIFFER = 1e-2, 0.2, 4.0
 
@@ -277,7 +280,7 @@ def conductivity_continuation(semismooth: SemismoothNewton) -> End | None:
     def solve(part: float, state: State) -> End:
         less = replace(interface, foundation=interface.foundation.conducting(part))
         method = semismooth if part == 1.0 else semismooth.on(problem.with_interface(less))
-        return method.iterate(state, note=CONTINUATION)
+        return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
 
     return continuation(solve, problem.start())
 

@@ -88,19 +88,21 @@ class SemismoothNewton:
         self,
         state: State,
         note: str = "",
+        stagnation_limit: int | None = None,
         give_up: bool = False,
         exact: bool = False,
         steps: int | None = None,
     ) -> End:
         """Iterate from an initial guess until the residuals converge or stagnate. Collective.
 
-        The records of the steps have the note. By default the most `steps` are those left.
-        `give_up`: end after a first step from zero that shows c to overestimate the stiffness.
-        `exact`: iterative solvers go to their own tolerance, without a forcing term.
+        The records of the steps have the note. By default the stagnation limit is that of the
+        options, and the most `steps` are those left. `give_up`: end after a first step from zero
+        that shows c to overestimate the stiffness. `exact`: iterative solvers go to their own
+        tolerance, without a forcing term.
         """
         problem, options, step = self.problem, self.options, self.step
         linear = problem.body.linear
-        monitor = ConvergenceMonitor(self, state, note)
+        monitor = ConvergenceMonitor(self, state, note, stagnation_limit)
         if monitor.starts_converged:
             return state, monitor.outcome()
         step.begin()
@@ -141,10 +143,12 @@ class ConvergenceMonitor:
         semismooth: SemismoothNewton,
         state: State,
         note: str = "",
+        stagnation_limit: int | None = None,
     ) -> None:
         self._semismooth, self._note = semismooth, note
         self._problem, self._options = semismooth.problem, semismooth.options
-        self._stagnation = Stagnation(self._options.stagnation_limit, PROGRESS, cumulative=True)
+        limit = stagnation_limit or self._options.stagnation_limit
+        self._stagnation = Stagnation(limit, PROGRESS, cumulative=True)
         self.iterate = evaluate_state(self._problem, state)
         self._pressed = self._largest_pressure(state)
         self.starts_converged = state.active_set is not None and self.converged

@@ -291,6 +291,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"is [{interior_point.SHARE_UNSUPPORTED}] of that of the loads": True,
         "below\n   [10⁻⁴]": interior_point.FORCING == 1e-4,
         "below [half] of the least": interior_point.PROGRESS == 0.5,
+        f"stagnation limit [{fallbacks.CONTINUATION_LIMIT}]": True,
         f"or after [{uzawa.STAGNATION_LIMIT}]\n": True,
         f"iterations, [{uzawa.STAGNATION_LIMIT_PLAIN}] without acceleration": True,
         "by [1 %]": uzawa.PROGRESS == 0.99,

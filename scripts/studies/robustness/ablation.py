@@ -69,10 +69,10 @@ def soft_block(stiffness: float) -> Tables:
     )  # fmt: skip
 
 
-def steep() -> Case:
+def steep(cells: tuple[int, int] = (96, 16), k_e: str = "0.6", delta: str = "83.3333") -> Case:
     """Return Example 8.4 with a steep ramp of the conductivity."""
-    changes = "solver.method=newton", "electric.k_e=0.6", "electric.delta=83.3333"
-    return on_grid("compliance-8-4", (96, 16), *changes)
+    changes = "solver.method=newton", f"electric.k_e={k_e}", f"electric.delta={delta}"
+    return on_grid("compliance-8-4", cells, *changes)
 
 
 def pulled_strip() -> Tables:
@@ -146,6 +146,11 @@ CLASSES: dict[str, Callable[[], Iterator[Made]]] = {
     "layers": lambda: (layer(part) for part in (0.9, 0.95, 0.99)),
     # Layers that are stiffer than the body, solved by multigrid.
     "stiff layers": lambda: (soft_block(k) for k in (500.0, 1500.0, 5000.0)),
+    # Example 8.4 with a foundation that conducts ten times as well, or more.
+    "conducting": lambda: (
+        steep(cells, k_e, "8.3333")
+        for cells in ((24, 4), (48, 8), (96, 16)) for k_e in ("6.0", "20.0")
+    ),
     "charged pairs": lambda: (charged_pair(size) for size in (0.3, 0.24, 0.18, 0.15, 0.12)),
     "pulled strip": single(pulled_strip),
     # A cantilever most of which lies on the ground, and that is condensed.
@@ -243,6 +248,9 @@ DEVICES = {
     ),
     "derivative of the conductivity by the gap": _off(
         safeguards.ConductivityDerivative, "__call__", _never
+    ),
+    "stagnation limit of the continuation": _off(
+        fallbacks, "CONTINUATION_LIMIT", None, "conducting"
     ),
     "zero displacement where nothing acts": _off(
         semismooth.ConvergenceMonitor, "_loss_of_contact", own="snap fits"
