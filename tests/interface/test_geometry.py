@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Body, Contact, Fixed, Friction, GapFunction, Motion, Sphere
+from contact import Body, Contact, Fixed, Friction, GapFunction, Motion, Plane, Sphere
+from contact.mesh.grid import rectangle
 from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
 from contact.methods.unconstrained_modes import UnconstrainedModes
@@ -196,3 +197,15 @@ def test_rigid_body_modes_of_a_method_are_those_of_its_geometry() -> None:
         np.testing.assert_array_equal(group.normal, anew.normal)
         off = max(off, np.abs(anew.normal - before.normal).max(initial=0.0))
     assert COMM.allreduce(off, op=MPI.MAX) > 1e-3
+
+
+@pytest.mark.parallel
+def test_contact_of_a_geometry_tells_whether_a_step_is_regularised() -> None:
+    """A body that has left the foundation was still one that contact constrains."""
+    domain = rectangle(COMM, (0.0, 0.0), (1.0, 1.0), (4, 4))
+    body = Body(Linear(1.0, 0.3), Fixed("top", [constant(0.0, 2), "free"]))
+    problem = ContactProblem(domain, body, Contact("bottom", Plane((0.0, 0.0), (0.0, 1.0))))
+    method = METHODS["newton"](problem, OPTIONS["newton"](), None)
+    assert not method.semismooth.step.underconstrained
+    method.set_load_step(problem.with_geometry([displaced(problem, shifted)]))
+    assert method.semismooth.step.underconstrained
