@@ -8,11 +8,11 @@ from typing import Any, TypeAlias
 from contact.errors import nearest, shown
 from contact.mesh.domain import meet, members
 from contact.model.body import Bolt, Electrode, Fixed, Load
-from contact.model.fields import CONSTANT
-from contact.model.formula import ZERO, Expression
+from contact.model.fields import CONSTANT, steady
+from contact.model.formula import ZERO, Expression, InTime
 from contact.model.messages import listed
 from contact.model.rigid import Motion
-from contact.model.section import walk
+from contact.model.section import entries, walk
 from contact.model.units import SYSTEMS, labels_of, other_label
 from contact.settings import Words, fault
 
@@ -21,6 +21,9 @@ Case: TypeAlias = Any
 
 #: Quantities that the constants of a material have: elastic, and piezoelectric.
 ELASTIC, ELECTRIC = ("length", "stress"), ("length", "stress", "potential", "charge")
+
+#: Values of keys that a case file has a text for.
+WRITTEN = str | float | int | tuple | dict | Expression | InTime | None
 
 #: Ends of the paths of names of parts.
 PARTS = (".on", ".against")
@@ -33,6 +36,9 @@ def check_sections(case: Case) -> None:
             case.require(case.evolution, path, "a formula in t with [evolution] only")
         if path.endswith(".amplitude") and isinstance(value, str):
             _check_amplitude(case, path, value)
+        if not (isinstance(value, WRITTEN) or value is steady or entries(value)):
+            accepted = "values of a case file; functions, UFL and objects are for Problem(...)"
+            raise fault(path, Words("given an object of Python"), accepted)
     _check_units(case)
     if not any(material.piezoelectric for _, material in case.materials):
         _check_mechanical(case)

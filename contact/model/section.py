@@ -516,6 +516,7 @@ NAMED = 'a name below evolution.amplitudes, or "constant"'
 FactorOfTime: TypeAlias = Annotated[
     Factor | str,
     PlainValidator(_factor),
+    PlainSerializer(lambda given: CONSTANT if given is steady else given),
     Accepted(NAMED),
     WithJsonSchema({"type": "string", "minLength": 1}),
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from contact import (
     Contact,
     FixedPointOptions,
+    GapFunction,
     InputError,
     Linear,
     Load,
@@ -20,6 +22,7 @@ from contact import (
     make_material,
     parse_case,
 )
+from contact.case.file import to_toml
 from contact.model.section import Section
 from tests.problems.bar import changed
 
@@ -110,3 +113,19 @@ def test_a_foundation_moves_by_a_motion_not_as_a_rigid_part() -> None:
 def test_names_that_are_no_texts_are_refused() -> None:
     with pytest.raises(InputError, match="1"):
         Contact("bottom").model_copy(update={1: 1})
+
+
+def test_a_copy_of_a_case_holds_what_a_file_says() -> None:
+    """Others were solved, and could not be written with the results."""
+    case = parse_case(changed(evolution={"times": [0.0, 1.0], "steps": [2]}))
+    always = case.load[0].model_copy(update={"amplitude": "constant"})
+    written = to_toml(case.model_copy(update={"load": (always,)}))
+    assert parse_case(tomllib.loads(written)).load[0].amplitude == "constant"
+    for update, place in (
+        ({"load": (Load("top", [0.0, lambda x: x[0]]),)}, r"load\.0\.traction\.1"),
+        ({"load": (Load("top", [0.0, 1.0], amplitude=lambda t: t),)}, r"load\.0\.amplitude"),
+        ({"contact": Contact("bottom", GapFunction(lambda x: x[1]))}, r"contact\.foundation"),
+        ({"material": Material(Linear(1.0, 0.3))}, r"material\.law"),
+    ):
+        with pytest.raises(InputError, match=rf"{place}: given an object of Python; accepted: "):
+            case.model_copy(update=update)
