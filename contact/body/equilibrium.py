@@ -5,7 +5,8 @@ piezoelectric body, the potential divided by `phi_scale` = sqrt(mu1/beta). In th
 blocks of the operator are of one magnitude in any unit system.
 
 The unknowns of a state are a local array: owned nodes, ghosts, then global unknowns, if any
-(`contact.body.global_unknowns`). No state is kept here: every query is given its own.
+(`contact.body.global_unknowns`). Every query is given its state; the forms hold that of the last
+one, to which `border` and the responses of laws with history belong.
 
 Forces and charges have no common unit, and separate bodies no common scale: beside the loads of
 another body any error of one may be small. Their norms are by connected component.

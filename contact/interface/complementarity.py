@@ -15,9 +15,10 @@ evaluates them. `linearise` linearises them node by node for a step of the semis
 These are lambda+ = lambda^0 + B T dx with the increment dx of the step. (19a) and (19b) perturb the
 derivative by c/gamma. With gamma far above the stiffness of the body they are nearly u_nu = rho and
 u_tau = 0, the conditions of the primal-dual active set strategy, and their residuals fall by that
-ratio in every step. Unlike that of Alart and Curnier the disc has the radius of lambda_c, not of
-lambda_c + c (u_nu - rho). The active set and the derivative of the bound by the slip are given:
-safeguards against cycling belong to the method (`contact.methods.safeguards`).
+ratio in every step. The bound s, the radius of the disc, is that of lambda_c and the layer's
+pressure; Alart and Curnier have lambda_c + c (u_nu - rho) in place of lambda_c. The active set and
+the derivative of the bound by the slip are given: safeguards against cycling belong to the method
+(`contact.methods.safeguards`).
 
 References
 ----------

@@ -2,7 +2,8 @@
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
-node by node. Newton's method takes the whole of `layer_block` and `charge_block`.
+node by node. Newton's method takes the whole of `layer_block` and `charge_block` once the active
+set no longer changes.
 
 Algorithms 4 and 6 of the thesis freeze the charge l, Algorithms 6 and 8 the layer's force j_1: all
 of each is on the right-hand side; so it is here where they are `lagged`. The variants of the code

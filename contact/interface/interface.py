@@ -1,7 +1,7 @@
 """Gamma_3 with all its laws, node by node.
 
-Of the body behind it has the constants c_0, size, elongation and connected components alone: no
-mesh, no space, no stiffness.
+It knows of the body only constants: moduli over lengths, size, elongation of the cells, connected
+components; no mesh, no space, no stiffness matrix.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ class Interface:
     fixed_conducting
         The charge at nodes without a free displacement, but with a free potential, or None.
     c_0
-        Reference stiffness c_0 = E/size (stress/length), E behind Gamma_3: the complementarity
-        parameter of the active set of a solution.
+        E/size (stress/length), E behind Gamma_3: the complementarity parameter of the active set
+        of a solution. Not the c_0 of docs/residuals.md, which is `stiffness`.
     stiffness
         E/L, L the extent of the smaller body of the contact, shape (n,) (stress/length).
     size

@@ -149,7 +149,7 @@ class Outcome:
 
     @property
     def converged(self) -> bool:
-        """Whether all residuals are within their tolerances, and no signal has interrupted."""
+        """Whether all residuals are within tolerance or rounding, and no signal has interrupted."""
         return not self.signal and not self.residuals.excess(self.allowed)
 
     @property

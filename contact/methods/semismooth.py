@@ -96,9 +96,9 @@ class SemismoothNewton:
         """Iterate from an initial guess until the residuals converge or stagnate. Collective.
 
         The records of the steps have the note. By default the stagnation limit is that of the
-        options, and the most `steps` are those left. `give_up`: end after a first step from zero
-        that shows c to overestimate the stiffness. `exact`: iterative solvers go to their own
-        tolerance, without a forcing term.
+        options, and the most `steps` are those left; never more than `max_iterations`. `give_up`:
+        end after a first step from zero that shows c to overestimate the stiffness. `exact`:
+        iterative solvers go to their own tolerance, without a forcing term.
         """
         problem, options, step = self.problem, self.options, self.step
         linear = problem.body.linear

@@ -13,7 +13,7 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class State:
-    """Unknowns and multipliers at a time; its arrays are read-only.
+    """Unknowns and multipliers at a time; their arrays are read-only.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class State:
     secant_at: Array | None = None
 
     def __post_init__(self) -> None:
-        """Mark the arrays as read-only."""
+        """Mark unknowns and multipliers as read-only."""
         for array in (self.x, self.multipliers.contact, self.multipliers.friction):
             array.flags.writeable = False
 
