@@ -37,7 +37,7 @@ from contact.linear import multigrid
 from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
-from contact.problem.linearised import Equations
+from contact.problem.solution_jacobian import Equations
 from contact.results.quantities import named_functionals
 from tests.problems.rigid import indented
 from tests.problems.taylor import (
@@ -371,7 +371,7 @@ def test_gradients_cost_no_more_than_one_parameter(monkeypatch):
 
 def products(solution):
     """Return the relative difference of <J^-1 a, b> and <a, J^-T b>, for random a and b."""
-    linearised = LoadPath(solution).linearised(-1)
+    jacobian = LoadPath(solution).jacobian(-1)
     body, rng = solution.problem.body, np.random.default_rng(0)
     shapes = body.owned_part(solution.state.x).shape, solution.problem.nodes.normal.shape
     mask = np.concatenate([body.free.ravel(), np.ones(body.global_unknowns.size)])
@@ -381,8 +381,8 @@ def products(solution):
         pair[0] *= mask
         normal = nodes.normal_component(pair[1])[:, None] * nodes.normal
         pair[1] = normal + nodes.tangential_component(pair[1])
-    x, f = linearised.solve(Equations(-a[0], -a[1]))
-    y, c = linearised.solve_transposed(*b)
+    x, f = jacobian.solve(Equations(-a[0], -a[1]))
+    y, c = jacobian.solve_transposed(*b)
     one = float(np.sum(x * b[0]) + np.sum(f * b[1]))
     other = float(np.sum(a[0] * y) + np.sum(a[1] * c))
     size = np.linalg.norm(x) * np.linalg.norm(b[0]) + np.linalg.norm(f) * np.linalg.norm(b[1])

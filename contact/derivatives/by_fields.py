@@ -70,9 +70,9 @@ def gap_gradient(solution: Solution, quantity: str | Functional) -> Array:
             "no-derivative",
         )
     gradient = np.zeros_like(solution.problem.nodes.gap)
-    for linearised, adjoints in backwards(path, functionals):
+    for jacobian, adjoints in backwards(path, functionals):
         for one in adjoints.values():
-            gradient += linearised.by_gap(one.x, one.conditions)
+            gradient += jacobian.by_gap(one.x, one.conditions)
     return gradient
 
 
@@ -130,8 +130,8 @@ def field_gradient(
     space = gradient.function_space
     works = [_FieldWork(problem.body, space) for problem in family.problems]
     values = np.zeros(space.dofmap.index_map.size_local)
-    for linearised, adjoints in backwards(path, functionals):
-        state, scale = linearised.state, linearised.problem.body.phi_scale
+    for jacobian, adjoints in backwards(path, functionals):
+        state, scale = jacobian.state, jacobian.problem.body.phi_scale
         for one in adjoints.values():
             weights = None if one.after is None else one.after.get(VARIABLES)
             assert weights is None or isinstance(weights, InternalVariables)

@@ -41,9 +41,10 @@ from contact.errors import InputError, counted
 from contact.history import History
 from contact.linear.operator import Counters
 from contact.methods.options import NewtonOptions
-from contact.problem.linearised import (
+from contact.problem.problem import ContactProblem
+from contact.problem.solution_jacobian import (
     Equations,
-    Linearised,
+    SolutionJacobian,
     active_set,
     before_along,
     before_transposed,
@@ -54,7 +55,6 @@ from contact.problem.linearised import (
     reference_norms,
     weakly_active,
 )
-from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import summed
 from contact.results.functionals import Differentiable, Functional, Largest, Reaction
@@ -421,9 +421,9 @@ class LoadPath:
         gamma = NewtonOptions().gamma
         self._parameters = base.scales.complementarity_parameters(gamma)
 
-    def linearised(self, index: int) -> Linearised:
+    def jacobian(self, index: int) -> SolutionJacobian:
         """Return the linearised equations at the end of a step. Collective."""
-        return Linearised(*self.steps[index], self._parameters, self.counters)
+        return SolutionJacobian(*self.steps[index], self._parameters, self.counters)
 
     def weakly_active(self) -> Array:
         """Return the points of weakly active nodes of all steps. Collective."""
@@ -450,10 +450,10 @@ def _sum(history: History, factor: float, change: History) -> History:
     return history.replaced({k: v + factor * more[k] for k, v in history.arrays().items()})
 
 
-def _explicit(family: Family, state: State, linearised: Linearised) -> tuple[Equations, _Sides]:
+def _explicit(family: Family, state: State, jacobian: SolutionJacobian) -> tuple[Equations, _Sides]:
     """Return dG/dm at fixed z and h, and the problems and states of the difference. Collective."""
     sides = [at(problem, state) for problem in family.problems]
-    by_side = [equations(*side, linearised.active) for side in sides]
+    by_side = [equations(*side, jacobian.active) for side in sides]
     change = Equations(
         family.slope([one.forces for one in by_side]),
         family.slope([one.conditions for one in by_side]),
@@ -491,15 +491,15 @@ def _tangent(
     first = path.steps[0][0].history
     histories = dict.fromkeys(families, _sum(first, -1.0, first))
     for index, (problem, state) in enumerate(path.steps):
-        linearised, body = path.linearised(index), problem.body
+        jacobian, body = path.jacobian(index), problem.body
         gradients = {
             name: quantity.gradient(problem, state)
             for name, quantity in _with_gradients(quantities).items()
         }
         for key, family in families.items():
-            change, still = _explicit(family, state, linearised)
-            by_history = before_along(linearised, histories[key])
-            x, forces = linearised.solve(change + by_history)
+            change, still = _explicit(family, state, jacobian)
+            by_history = before_along(jacobian, histories[key])
+            x, forces = jacobian.solve(change + by_history)
             for name, quantity in quantities.items():
                 if name not in gradients:
                     moved = _moved(family, state, x, forces, histories[key])
@@ -513,7 +513,7 @@ def _tangent(
                     value += body.product(quantity.weights(problem), by_history.forces)
                 rows[name][key].append(value)
             if index + 1 < len(path.steps):
-                ends = commit_along(linearised, x, histories[key])
+                ends = commit_along(jacobian, x, histories[key])
                 histories[key] = _sum(ends, 1.0, _explicit_history(family, still))
     for name, columns in rows.items():
         sensitivities.steps[name] = {key: np.array(values) for key, values in columns.items()}
@@ -522,7 +522,7 @@ def _tangent(
 
 @dataclass(frozen=True)
 class Adjoint:
-    """The adjoint w of a step and quantity, as of `Linearised.solve_transposed`."""
+    """The adjoint w of a step and quantity, as of `SolutionJacobian.solve_transposed`."""
 
     x: Array
     conditions: Array
@@ -534,12 +534,12 @@ class Adjoint:
 
 def backwards(
     path: LoadPath, quantities: Mapping[str, Differentiable]
-) -> Iterator[tuple[Linearised, dict[str, Adjoint]]]:
+) -> Iterator[tuple[SolutionJacobian, dict[str, Adjoint]]]:
     """Yield equations and adjoints of the steps, from the last to the first. Collective."""
     after: dict[str, History | None] = dict.fromkeys(quantities)
     for index in reversed(range(len(path.steps))):
         problem, state = path.steps[index]
-        linearised, adjoints = path.linearised(index), {}
+        jacobian, adjoints = path.jacobian(index), {}
         for name, quantity in quantities.items():
             end = after[name]
             if end is None:
@@ -547,15 +547,15 @@ def backwards(
             else:
                 by_x = commit_transposed(problem, state, end)
                 by_force = np.zeros_like(problem.nodes.normal)
-            x, conditions = linearised.solve_transposed(by_x, by_force)
+            x, conditions = jacobian.solve_transposed(by_x, by_force)
             weights = (
                 quantity.weights(problem) if isinstance(quantity, Reaction) and not end else 0.0
             )
             adjoints[name] = Adjoint(x, conditions, weights - x, end)
-        yield linearised, adjoints
+        yield jacobian, adjoints
         if index > 0:
             after = {
-                name: before_transposed(linearised, one.along, one.conditions, one.after)
+                name: before_transposed(jacobian, one.along, one.conditions, one.after)
                 for name, one in adjoints.items()
             }
 
@@ -569,10 +569,10 @@ def _adjoint(
     """Carry the adjoint of each quantity backwards through the steps. Collective."""
     for name in quantities:
         sensitivities[name] = dict.fromkeys(families, 0.0)
-    for linearised, adjoints in backwards(path, quantities):
-        problem, state = linearised.problem, linearised.state
+    for jacobian, adjoints in backwards(path, quantities):
+        problem, state = jacobian.problem, jacobian.state
         for key, family in families.items():
-            change, sides = _explicit(family, state, linearised)
+            change, sides = _explicit(family, state, jacobian)
             for name, one in adjoints.items():
                 sensitivities[name][key] -= problem.body.product(one.x, change.forces)
                 sensitivities[name][key] -= _total(problem, one.conditions, change.conditions)

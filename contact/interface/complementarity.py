@@ -79,11 +79,11 @@ def interface_residuals(
     now = np.linalg.norm(jump[:, : interface.dim], axis=1)
     motion = np.maximum(now, before)
     gap = np.minimum(np.minimum(np.abs(normal_gap), motion), interface.size)
-    gap_stress = interface.norms(interface.stiffness * gap)
+    gap_stress = interface.norms(interface.c_0 * gap)
     total = interface.norms(interface.pressure(jump, multipliers))
     # Without pressure nodes may just touch: their gaps are rounding too.
     rounding_stress = interface.norms(np.full_like(motion, interface.rounding_stress(jump)))
-    motion_stress = interface.norms(interface.stiffness * np.minimum(now, interface.size))
+    motion_stress = interface.norms(interface.c_0 * np.minimum(now, interface.size))
     gap_stress = np.where(
         total <= rounding_stress, np.maximum(gap_stress, motion_stress), gap_stress
     )
@@ -176,14 +176,14 @@ def linearise(
     friction, sticks, slips = np.zeros_like(n), active.sticks, active.slips
     # (19b): lambda_f+ = lambda_f + gamma u_tau+ where it sticks.
     friction[sticks] = (multipliers.friction + gamma * slip)[sticks]
-    blocks[sticks, :d, :d] += gamma * nodes.tangent[sticks]
+    blocks[sticks, :d, :d] += gamma * nodes.tangential_projector[sticks]
     # (19c): lambda_f+ = s+ e + theta Q u_tau+ where it slips, e = z/|z|, z = lambda_f + c u_tau.
     z = multipliers.friction + parameters.c * slip
     size = np.linalg.norm(z, axis=1)
     e = z / np.maximum(size, 1e-300)[:, None]
     least = np.maximum(s * parameters.c / gamma, 1e-300)  # theta is at most gamma
     theta = s * parameters.c / np.maximum(size - s, least)
-    across = theta[:, None, None] * (nodes.tangent - e[:, :, None] * e[:, None, :])
+    across = theta[:, None, None] * (nodes.tangential_projector - e[:, :, None] * e[:, None, :])
     slipping = s_plus[:, None] * e + np.einsum("nij,nj->ni", across, slip)
     friction[slips] = slipping[slips]
     blocks[slips, :d, :] += e[slips, :, None] * gradient[slips, None, :]

@@ -248,13 +248,13 @@ class NodalFriction:
         """Return the accumulated slip at the end of a step with this slip, shape (n,)."""
         return self.history.accumulated + slip
 
-    def bound(self, pressure: Array, slip: Array) -> Array:
+    def bound(self, slip: Array, pressure: Array) -> Array:
         """Return s, mu max(R p, 0) by Coulomb's law, shape (n,). Collective."""
         if self.law is None:
             return np.zeros_like(slip)
         return np.asarray(self.law(self._accumulated(slip), self.smooth(pressure)), dtype=float)
 
-    def by_slip(self, pressure: Array, slip: Array) -> Array:
+    def by_slip(self, slip: Array, pressure: Array) -> Array:
         """Return the derivative of the bound by the slip, shape (n,). Collective."""
         if self.law is None:
             return np.zeros_like(slip)
@@ -262,7 +262,7 @@ class NodalFriction:
             self.law.by_slip(self._accumulated(slip), self.smooth(pressure)), dtype=float
         )
 
-    def by_pressure(self, pressure: Array, slip: Array) -> Array:
+    def by_pressure(self, slip: Array, pressure: Array) -> Array:
         """Return the derivative of the bound by the pressure at the node, shape (n,).
 
         0 where p < 0, for s is a function of max(p, 0); and 0 for a smoothed pressure: it would

@@ -60,15 +60,17 @@ class Interface:
         Friction.
     fixed_conducting
         The charge at nodes without a free displacement, but with a free potential, or None.
+    reference_stiffness
+        E/size, E behind Gamma_3: the complementarity parameter with which the active set of a
+        solution is told (stress/length).
     c_0
-        E/size (stress/length), E behind Gamma_3: the complementarity parameter of the active set
-        of a solution. Not the c_0 of docs/residuals.md, which is `stiffness`.
-    stiffness
-        E/L, L the extent of the smaller body of the contact, shape (n,) (stress/length).
+        E/L of docs/residuals.md, L the extent of the smaller body of the contact, shape (n,)
+        (stress/length).
     size
         Largest extent of the body (length).
     elongation
-        Depth over width, >= 1, of the cells behind Gamma_3 (`contact.mesh.entities.elongation`).
+        Largest diameter of the cells behind Gamma_3 over twice the shortest edge of their facets,
+        >= 1 (`contact.mesh.entities.elongation`).
     connected_component, connected_components
         Connected component of each contact node, shape (n,), and their number
         (`contact.body.equilibrium`).
@@ -81,8 +83,8 @@ class Interface:
     foundation: FoundationLaw
     friction: NodalFriction
     fixed_conducting: FoundationLaw | None
-    c_0: float
-    stiffness: Array
+    reference_stiffness: float
+    c_0: Array
     size: float
     elongation: float
     connected_component: NDArray[np.intp]
@@ -93,10 +95,10 @@ class Interface:
     def c_r(self) -> Array:
         """Complementarity parameter c_r of the residuals (16), shape (n,) (stress/length).
 
-        It is elongation times `stiffness`: behind facets that are short beside the depth of their
+        It is elongation times `c_0`: behind facets that are short beside the depth of their
         cells a gap takes a stress far above that, and errors of the pressure would be hidden.
         """
-        return self.elongation * self.stiffness
+        return self.elongation * self.c_0
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -181,7 +183,7 @@ class Interface:
 
     def bound(self, jump: Array, multipliers: Multipliers) -> Array:
         """Return the friction bound s, shape (n,). Collective."""
-        return self.friction.bound(self.pressure(jump, multipliers), self.slip_length(jump))
+        return self.friction.bound(self.slip_length(jump), self.pressure(jump, multipliers))
 
     def traction(self, jump: Array, multipliers: Multipliers) -> Array:
         """Return -sigma nu, exerted on the foundation, layer included, shape (n, d)."""
@@ -199,9 +201,10 @@ class Interface:
     ) -> ActiveSet:
         """Return the active set: open, stick, slip.
 
-        `c` (c_0 by default) and `rounding_stress` are those of `constraint_active`.
+        `c` and `rounding_stress` are those of `constraint_active`; c is `reference_stiffness` by
+        default.
         """
-        c = self.c_0 if c is None else c
+        c = self.reference_stiffness if c is None else c
         closed = constraint_active(multipliers.contact, self.normal_gap(jump), c, rounding_stress)
         if not self.friction.acts:
             return ActiveSet.without_slip(closed, False)
@@ -220,7 +223,7 @@ class Interface:
     def rounding_stress(self, jump: Array) -> float:
         """Return the pressure of a rounding of the displacements (stress). Collective."""
         displacement = np.abs(jump[:, : self.nodes.dim]).max(axis=1, initial=0.0)
-        return 2 * ROUNDING * self.c_0 * self.nodes.maximum(displacement)
+        return 2 * ROUNDING * self.reference_stiffness * self.nodes.maximum(displacement)
 
     def negligible(self, jump: Array, pressure: Array) -> float:
         """Return the rounding of pressures, by displacements or the largest one. Collective."""
@@ -277,7 +280,9 @@ class Interface:
         """
         if self.proximal is not None:
             blocks = blocks.copy()
-            blocks[:, : self.dim, : self.dim] += self.proximal.stiffness * self.nodes.tangent
+            blocks[:, : self.dim, : self.dim] += (
+                self.proximal.stiffness * self.nodes.tangential_projector
+            )
         weighted = self.nodes.weight[:, None, None] * blocks
         if self.fixed_conducting is None:
             return weighted

@@ -110,15 +110,16 @@ def constraint_active(
 
 @dataclass(frozen=True)
 class ActiveSet:
-    """The state of each contact node.
+    """The state of each contact node: closed or open, and stick, slip or neither.
 
     Attributes
     ----------
     closed
         Where the non-penetration constraint is active, shape (n,).
     sticks, slips
-        Where |lambda_f + c u_tau| <= s, and above, shape (n,). By Tresca's law, a smoothed
-        pressure or the pressure of a compliant layer open nodes have a bound, and do either.
+        Where |lambda_f + c u_tau| <= s, and above, shape (n,), of nodes that are closed or have a
+        friction bound s > 0. Open nodes have one by Tresca's law, by a smoothed pressure and by
+        that of a compliant layer: they stick or slip too.
     """
 
     closed: NDArray[np.bool_]

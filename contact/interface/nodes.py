@@ -34,7 +34,7 @@ def unit_vectors(vectors: Array) -> Array:
 def contact_directions(
     normal: Array, movable: Array, prescribed: NDArray[np.bool_] | bool = True
 ) -> tuple[Array, Array]:
-    """Return `admissible_normal` and `tangent` of `ContactNodes`, shapes (n, d) and (n, d, d).
+    """Return `admissible_normal` (n, d) and `tangential_projector` (n, d, d) of `ContactNodes`.
 
     The contact directions, (n, d), have an unconstrained part each; `movable` are the projectors
     onto the unconstrained directions, (n, d, d). `prescribed` says whether supports alone prescribe
@@ -78,7 +78,7 @@ class ContactNodes:
     admissible_normal
         nu_a, the least free displacement with nu_a . nu = 1, shape (n, d); nu unless supports hold
         the node aslant to it.
-    tangent
+    tangential_projector
         P_tau, the projector onto the directions of slip and friction, shape (n, d, d): the second
         formula where supports hold the node aslant to nu, or while the other side moves along
         them. The other jumps are no unknowns there, as on a plane of symmetry, and the supports
@@ -107,7 +107,7 @@ class ContactNodes:
     weight: Array
     normal: Array
     admissible_normal: Array
-    tangent: Array
+    tangential_projector: Array
     gap: Array
     deviation: Array
     block_size: int
@@ -158,8 +158,8 @@ class ContactNodes:
     def tangential_component(self, u: Array) -> Array:
         """Return u_tau in the free tangential directions, shape (n, d)."""
         # Twice: once would leave rounding of u along the normal, beside which u_tau may be small.
-        once = np.einsum("nij,nj->ni", self.tangent, u[:, : self.dim])
-        return np.einsum("nij,nj->ni", self.tangent, once)
+        once = np.einsum("nij,nj->ni", self.tangential_projector, u[:, : self.dim])
+        return np.einsum("nij,nj->ni", self.tangential_projector, once)
 
     def sum(self, values: Array) -> float:
         """Return the lumped integral of nodal values over Gamma_3."""
@@ -294,7 +294,15 @@ def side_by_side(
 ) -> ContactNodes:
     """Return the nodes of several contacts as one array, with the operator of their jumps."""
     first = groups[0]
-    names = ["nodes", "points", "weight", "normal", "admissible_normal", "tangent", "gap"]
+    names = [
+        "nodes",
+        "points",
+        "weight",
+        "normal",
+        "admissible_normal",
+        "tangential_projector",
+        "gap",
+    ]
     names += ["deviation"] if first.motion is None else ["deviation", "motion"]
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(group, name) for group in groups]) for name in names

@@ -82,7 +82,7 @@ class PairPlacement:
         )
         movable = body.movable(local)
         prescribed = _prescribed(body, coupling, slave.owners, movable)
-        admissible, tangent = contact_directions(normal, movable, prescribed)
+        admissible, projector = contact_directions(normal, movable, prescribed)
         nodes = ContactNodes(
             comm=body.comm,
             nodes=local,
@@ -90,7 +90,7 @@ class PairPlacement:
             weight=coupling.weight,
             normal=normal,
             admissible_normal=admissible,
-            tangent=tangent,
+            tangential_projector=projector,
             gap=gap + self.added,
             deviation=np.full(local.size, unknown),
             block_size=body.block_size,

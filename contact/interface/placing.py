@@ -196,7 +196,7 @@ class FoundationPlacement:
             chord = (candidates.facing > 0) & (gap < 0) & (-gap <= candidates.chord_penetration)
             cut = body.comm.allreduce(float(np.max(-gap[chord], initial=0.0)), op=MPI.MAX)
             gap = np.where(chord, 0.0, gap)
-        admissible, tangent = contact_directions(direction, body.movable(of))
+        admissible, projector = contact_directions(direction, body.movable(of))
         nodes = ContactNodes(
             comm=body.comm,
             nodes=of,
@@ -204,7 +204,7 @@ class FoundationPlacement:
             weight=candidates.weight[self.contact],
             normal=direction,
             admissible_normal=admissible,
-            tangent=tangent,
+            tangential_projector=projector,
             gap=candidates.of_jumps(gap)[self.contact],
             deviation=candidates.unknown[self.contact],
             block_size=body.block_size,
@@ -224,7 +224,7 @@ class FoundationPlacement:
             weight=candidates.weight[conducting],
             normal=candidates.direction[conducting],
             admissible_normal=candidates.direction[conducting],
-            tangent=np.zeros((conducting_nodes.size, body.dim, body.dim)),
+            tangential_projector=np.zeros((conducting_nodes.size, body.dim, body.dim)),
             gap=candidates.of_jumps(candidates.gap)[conducting],
             deviation=candidates.unknown[conducting],
             motion=None,
@@ -246,7 +246,7 @@ def find_nodes(
     they hold it aslant to that, as a plane of symmetry beside an inclined foundation does, it is
     met by the displacements that are free and those that are prescribed; the force along directions
     that are constrained is borne by the supports. Friction acts along the directions of
-    `ContactNodes.tangent`.
+    `ContactNodes.tangential_projector`.
 
     With `press` a shape may cut the body in the reference configuration. Where the foundation
     `conducts`, nodes that cannot move carry charge too. The geometry that is returned is that of

@@ -1,7 +1,8 @@
 """Linear operators: a bulk matrix plus small dense blocks at contact nodes, and its solver.
 
-The blocks are r (nu nu^T + tangential projector) of Step 1 in Algorithms 2, 5, 7 and 9, a compliant
-layer, a charge, or Newton's linearised contact laws.
+The blocks are derivatives of contact forces by the jumps of their node: Newton's linearised contact
+laws with layer and charge, or the augmentation r of the Uzawa block relaxation, Step 1 in
+Algorithms 2, 5, 7 and 9 of the thesis.
 
 With a potential the operator [[K, E^T], [E, -L]] is indefinite. With L the permittivity's
 Laplacian, diag(K, L) is positive definite and bounds the preconditioned spectrum by

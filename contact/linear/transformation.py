@@ -7,10 +7,10 @@ unknowns as x, and m global ones q behind them,
 
     x = Q (y^ + N_q q),     C = [Q, Q N_q].
 
-Q = T^-1 on the rows of slave nodes, u_s = D^-1 ([u] + M u_m), makes the jumps their unknowns, so
-that contact laws are blocks at single nodes of y^. The columns of N_q are rigid motions and
-potentials of electrodes: tied nodes, which follow q, have no y^, and at contact nodes in front of a
-moving foundation y^ is the displacement relative to it.
+Q puts the jumps [u] in the place of the unknowns of the slave nodes, u_s = D^-1 ([u] + M u_m), and
+leaves the others, so that contact laws are blocks at single nodes of y^. The columns of N_q are
+rigid motions and potentials of electrodes: tied nodes, which follow q, have no y^, and at contact
+nodes in front of a moving foundation y^ is the displacement relative to it.
 
 K^ = Q^T K Q is computed by PtAP. N_q would fill the rows of all tied nodes: q borders the system
 instead,

@@ -1,6 +1,6 @@
 """The semismooth Newton method with its fallbacks, on one problem.
 
-1. Newton's steps on one problem, the whole or the condensed one (`solve_contact`).
+1. Newton's steps on one problem, the whole or the condensed one (`solve_with_fallbacks`).
 2. Fallbacks, where these end without convergence, in turn (`fall_back`):
 
    - all nodes open, by one linear solve from the best iterate, then a working set from there;
@@ -79,9 +79,9 @@ NEARER, STAGNANT_PROBLEMS = 0.9, 16
 NEARLY_BALANCED = 0.03
 
 
-def solve_contact(semismooth: SemismoothNewton, begin: State) -> End:
+def solve_with_fallbacks(semismooth: SemismoothNewton, begin: State) -> End:
     """Solve one problem by Newton's steps, then by its fallbacks. Collective."""
-    state, outcome = semismooth.iterate(begin, give_up=True)
+    state, outcome = semismooth.iterate(begin, check_c=True)
     if outcome.converged and semismooth.modes.unconstrained_at(semismooth.problem, state):
         end = fall_back(semismooth, state, outcome)
         return end if end[1].converged else (state, outcome)
@@ -148,7 +148,7 @@ def all_open(semismooth: SemismoothNewton) -> State | None:
 
 
 def working_set(semismooth: SemismoothNewton, without_contact: State | None) -> End | None:
-    """Return the solution with all nodes open, or that of `dual_active_set`, if any. Collective.
+    """Return the solution with all nodes open, or of `growing_working_set`, or None. Collective.
 
     Active sets may cycle on contact forces that are rounding.
     """
@@ -156,14 +156,14 @@ def working_set(semismooth: SemismoothNewton, without_contact: State | None) -> 
         return None
     problem, allowed = semismooth.problem, semismooth.options.allowed
     residuals = evaluate(problem, without_contact)
-    if not residuals.excess(allowed):
+    if not residuals.unmet(allowed):
         return without_contact, Outcome(residuals, allowed)
-    candidate = dual_active_set(semismooth, without_contact)
+    candidate = growing_working_set(semismooth, without_contact)
     if candidate is None:
         return None
     residuals = evaluate(problem, candidate)
     semismooth.see(candidate, residuals)
-    return None if residuals.excess(allowed) else (candidate, Outcome(residuals, allowed))
+    return None if residuals.unmet(allowed) else (candidate, Outcome(residuals, allowed))
 
 
 def interior_points(semismooth: SemismoothNewton, without_contact: State | None) -> End | None:
@@ -207,12 +207,13 @@ def rigid_motion(
     return (state, outcome) if outcome.converged else None
 
 
-def dual_active_set(semismooth: SemismoothNewton, state: State) -> State | None:
-    """Return a solution by a working set of contact nodes (dual active set method). Collective.
+def growing_working_set(semismooth: SemismoothNewton, state: State) -> State | None:
+    """Return a solution by Newton's method on a growing set of contact nodes. Collective.
 
     For bodies that touch at one node or two: stops, tips, corners. Without contact most of their
     nodes penetrate, and active sets of all these cycle. The node of largest penetration enters the
-    working set, then one more in turn. None where a node more does not halve the number of those
+    working set, then one more in turn, as in dual active set methods; none leaves it, but Newton's
+    method may open it. None where a node more does not halve the number of those
     that penetrate: an interior point then takes fewer steps.
     """
     problem, interface = semismooth.problem, semismooth.problem.interface
@@ -225,7 +226,7 @@ def dual_active_set(semismooth: SemismoothNewton, state: State) -> State | None:
         gap = np.where(inside, interface.gap, np.inf)
         less = problem.with_interface(replace(interface, gap=gap))
         # At one stiff node of a soft body a forcing term leaves pressures of any sign.
-        state, outcome = semismooth.on(less).iterate(state, note=WORKING_SET, exact=True)
+        state, outcome = semismooth.with_problem(less).iterate(state, note=WORKING_SET, exact=True)
         before = count
         deepest, count = _penetrating(interface, state, inside)
         if not outcome.converged or count > PROGRESS * before:
@@ -240,7 +241,7 @@ def _penetrating(
     jump = interface.nodes.jump(state.x)
     depth = np.where(inside, 0.0, -interface.normal_gap(jump))
     deepest = interface.nodes.maximum(depth)
-    rounding_length = interface.rounding_stress(jump) / interface.c_0
+    rounding_length = interface.rounding_stress(jump) / interface.reference_stiffness
     count = int(summed(interface.comm, np.count_nonzero(depth > rounding_length)))
     return deepest, count
 
@@ -279,7 +280,9 @@ def conductivity_continuation(semismooth: SemismoothNewton) -> End | None:
 
     def solve(part: float, state: State) -> End:
         less = replace(interface, foundation=interface.foundation.conducting(part))
-        method = semismooth if part == 1.0 else semismooth.on(problem.with_interface(less))
+        method = (
+            semismooth if part == 1.0 else semismooth.with_problem(problem.with_interface(less))
+        )
         return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
 
     return continuation(solve, problem.start())
@@ -304,7 +307,7 @@ def layer_secants(semismooth: SemismoothNewton) -> End | None:
     regimes: NDArray[np.int8] = np.full(largest.size, -1, dtype=np.int8)
     for _ in range(SECANTS):
         bed = foundation.elastic_bed(np.maximum(secant, SOFTEST * largest))
-        method = semismooth.on(problem.with_interface(replace(interface, foundation=bed)))
+        method = semismooth.with_problem(problem.with_interface(replace(interface, foundation=bed)))
         state, outcome = method.iterate(state, note=SECANT)
         if not outcome.converged:
             end = proximal_points(method)
@@ -345,7 +348,7 @@ def proximal_points(semismooth: SemismoothNewton) -> End | None:
     while stagnant < STAGNANT_PROBLEMS:
         stagnant += 1
         term = Proximal(stiffness, nodes.tangential_component(nodes.jump(state.x)))
-        method = semismooth.on(problem.with_interface(replace(interface, proximal=term)))
+        method = semismooth.with_problem(problem.with_interface(replace(interface, proximal=term)))
         try:
             balanced, outcome = method.iterate(state, note=PROXIMAL_POINT)
         except SingularError:  # no contact: a normal motion is unconstrained

@@ -447,7 +447,7 @@ class InteriorPoint:
         cones.scale()
         stiff, across = cones.stiffness()
         blocks = np.zeros((nodes.nodes.size, nodes.block_size, nodes.block_size))
-        normal, tangent = nodes.normal[rigid], nodes.tangent[frictional]
+        normal, tangent = nodes.normal[rigid], nodes.tangential_projector[frictional]
         blocks[rigid, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
         blocks[frictional, :d, :d] += tangent @ across @ tangent
         self._step.assemble(self.problem, state, blocks / nodes.weight[:, None, None])

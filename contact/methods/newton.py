@@ -36,7 +36,7 @@ from contact.methods.fallbacks import (
     SECANT,
     WORKING_SET,
     fall_back,
-    solve_contact,
+    solve_with_fallbacks,
 )
 from contact.methods.interior_point import INTERIOR_POINT, OVERLOADED
 from contact.methods.newton_step import NewtonStep
@@ -107,7 +107,7 @@ class Chord:
         if not self._factorised or self._most_steps <= 0:
             reuse = False
         elif before is None:
-            reuse = state.near
+            reuse = state.starts_with_tangent
         elif reached >= last and self._reused:
             state, reached, reuse = before, last, False
         else:
@@ -142,7 +142,7 @@ class CondensedSteps:
         if monitor.starts_converged:
             return state, monitor.outcome()
         chord.begin()
-        tangent = state.near and not body.linear
+        tangent = state.starts_with_tangent and not body.linear
         for _ in range(min(options.max_iterations, whole.steps_left)):
             previous, last = state, monitor.iterate
             largest = last.residuals.significant
@@ -159,23 +159,23 @@ class CondensedSteps:
                 enough = max(enough, CONTACT_PART * min(largest, 1.0))
             method = _on_contact_nodes(whole, condensed_problem, enough)
             begin = replace(state, x=condensed_problem.body.x_0, secant_at=None)
-            end, outcome = solve_contact(method, begin)
+            solved, outcome = solve_with_fallbacks(method, begin)
             records = tuple(method.recorder.records)
             self._counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear
             unsolved = outcome.residuals.significant > max(enough, UNSOLVED * largest)
             if unsolved and not overloaded:
                 return previous, monitor.outcome(UNSOLVED_ON_CONTACT_NODES)
-            increment = self.condensation.expand(condensed_problem, end.x)
-            state = replace(end, x=body.updated(state.x, increment), history=state.history)
+            increment = self.condensation.expand(condensed_problem, solved.x)
+            state = replace(solved, x=body.updated(state.x, increment), history=state.history)
             monitor.evaluate(state)
             taken = [word for word in FALLBACKS if any(word in r.note for r in records)]
             note = ", ".join([*["chord step"] * reuse, *taken])
             monitor.record(note, "tangent" * tangent, steps=records)
             if overloaded and not monitor.converged:
                 return state, replace(monitor.outcome(OVERLOADED), overloaded=True)
-            if (ended := monitor.ended()) is not None:
-                return ended
+            if (end := monitor.end()) is not None:
+                return end
             if not body.linear:
                 tangent = monitor.next_is_tangent(tangent, last.residuals)
             if (stalled := monitor.stalled()) is not None:
@@ -269,6 +269,6 @@ class Newton:
             if not outcome.final:
                 state, outcome = fall_back(semismooth, state, outcome)
         else:
-            state, outcome = solve_contact(semismooth, begin)
+            state, outcome = solve_with_fallbacks(semismooth, begin)
         semismooth.last = state
         return state, outcome

@@ -1,7 +1,7 @@
 """One step of Newton's method: material, contact, friction, layer and charge linearised together.
 
-The multipliers are condensed with gamma, far above the stiffness of the body, and updated,
-lambda+ = lambda + gamma (u_nu+ - rho), (19a): as gamma grows this is the primal-dual
+The multipliers are eliminated node by node, with gamma far above the stiffness of the body:
+lambda+ = lambda + gamma (u_nu+ - rho), (19a). As gamma grows this is the primal-dual
 active set strategy. The linear systems keep the size and pattern of the elastic ones. Iterative
 solvers stop at a forcing term (inexact Newton). `safeguards` keep active sets from cycling.
 
@@ -181,8 +181,8 @@ class NewtonStep:
         """Linearise contact, friction, layer and charge. Collective."""
         parameters, before = self.parameters, state.active_set
         jump = interface.nodes.jump(state.x)
-        total, length = interface.pressure(jump, state.multipliers), interface.slip_length(jump)
-        s = interface.friction.bound(total, length)
+        pressure, length = interface.pressure(jump, state.multipliers), interface.slip_length(jump)
+        s = interface.friction.bound(length, pressure)
         active, about = guarded_active_set(
             interface, jump, state.multipliers, s, parameters.c, before
         )
@@ -191,8 +191,8 @@ class NewtonStep:
         by_slip = np.zeros_like(s)
         if unchanged:
             limit = self.options.softening * parameters.nodal_stiffness
-            by_slip = bound_by_slip(interface, total, length, limit)
-        bound = LinearisedBound(s, interface.friction.by_pressure(total, length), by_slip)
+            by_slip = bound_by_slip(interface, length, pressure, limit)
+        bound = LinearisedBound(s, interface.friction.by_pressure(length, pressure), by_slip)
         constant, blocks = linearise(interface, jump, about, active, parameters, bound)
         layer, shift = linearised_layer(interface, jump, state, parameters, unchanged)
         law, charge = interface.foundation, np.zeros_like(blocks)

@@ -139,8 +139,8 @@ class NewtonOptions(Options):
     max_iterations: Internal[int] = 60
     """Number of steps allowed in each stage."""
     gamma: Internal[float] = 1e4
-    """gamma E/(E_3 max(c, kappa)), (20): the ratio of the augmentation parameter, with which the
-    multipliers are condensed, to the stiffness at the contact."""
+    """gamma E/(E_3 max(c, kappa)), (20): the ratio of the augmentation parameter gamma, with which
+    the multipliers are eliminated node by node, to the stiffness at the contact."""
     stagnation_limit: Internal[int] = 12
     """Steps without progress after which the stage is given up."""
     softening: Internal[Annotated[float, AllowInfNan()]] = 0.25

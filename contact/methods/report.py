@@ -1,4 +1,4 @@
-"""Report of a solve: a `Record` of each outer iteration, and its `Outcome`.
+"""Report of a solve: a `Record` of each step or outer iteration, and its `Outcome`.
 
 And its end by the residuals, alike on all ranks: `Stagnation`, the stagnation limit, and `Best`,
 the iterate of least residual.
@@ -28,7 +28,7 @@ def tell(logger: logging.Logger, share: float, text: str, *values: object) -> No
 
 @dataclass(frozen=True)
 class Record:
-    """One outer iteration.
+    """One step of Newton's method, or one outer iteration (Kacanov) of the thesis' methods.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class Outcome:
     @property
     def converged(self) -> bool:
         """Whether all residuals are within tolerance or rounding, and no signal has interrupted."""
-        return not self.signal and not self.residuals.excess(self.allowed)
+        return not self.signal and not self.residuals.unmet(self.allowed)
 
     @property
     def final(self) -> bool:
@@ -162,9 +162,9 @@ class Outcome:
         """Reason of the end, and the residuals, in words."""
         if self.signal:
             return self.ended
-        if excess := self.residuals.excess(self.allowed):
+        if unmet := self.residuals.unmet(self.allowed):
             met = f"{self.criterion}, but " if self.criterion else ""
-            return (f"{self.ended}: " if self.ended else met) + excess
+            return (f"{self.ended}: " if self.ended else met) + unmet
         words = self.criterion or f"all residuals <= {self.allowed.largest:g}"
         granted = self.residuals.granted(self.allowed)
         return f"{words}, to rounding: {granted}" if granted else words

@@ -70,13 +70,13 @@ def _power(friction: Array, slip: Array) -> Array:
     return np.einsum("ni,ni->n", friction, slip)
 
 
-def bound_by_slip(interface: Interface, total: Array, length: Array, limit: float) -> Array:
-    """Return max(ds/d|u_tau|, -limit) at pressures and |u_tau|, (n,).
+def bound_by_slip(interface: Interface, length: Array, pressure: Array, limit: float) -> Array:
+    """Return max(ds/d|u_tau|, -limit) at |u_tau| and pressures, shapes (n,).
 
     The limit is the part of a node's stiffness that a falling bound may take away (stress/length):
     with one that falls faster than the stiffness, slip snaps. Collective.
     """
-    return np.maximum(interface.friction.by_slip(total, length), -limit)
+    return np.maximum(interface.friction.by_slip(length, pressure), -limit)
 
 
 def regularisation(interface: Interface, residual: float, nodal_stiffness: float) -> Array:
@@ -86,7 +86,9 @@ def regularisation(interface: Interface, residual: float, nodal_stiffness: float
     """
     nodes = interface.nodes
     along = nodes.normal[:, :, None] * nodes.normal[:, None, :]
-    return REGULARISATION * min(residual, 1.0) * nodal_stiffness * (along + nodes.tangent)
+    return (
+        REGULARISATION * min(residual, 1.0) * nodal_stiffness * (along + nodes.tangential_projector)
+    )
 
 
 @dataclass

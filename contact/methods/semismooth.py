@@ -68,7 +68,7 @@ class SemismoothNewton:
         self.last = state
         self.best.see(state, residuals.significant)
 
-    def on(self, problem: AnyProblem) -> SemismoothNewton:
+    def with_problem(self, problem: AnyProblem) -> SemismoothNewton:
         """Return the method on a problem with another interface, with the same operator."""
         return SemismoothNewton(problem, self.options, self.step, self.modes, self.recorder)
 
@@ -89,14 +89,14 @@ class SemismoothNewton:
         state: State,
         note: str = "",
         stagnation_limit: int | None = None,
-        give_up: bool = False,
+        check_c: bool = False,
         exact: bool = False,
         steps: int | None = None,
     ) -> End:
         """Iterate from an initial guess until the residuals converge or stagnate. Collective.
 
         The records of the steps have the note. By default the stagnation limit is that of the
-        options, and the most `steps` are those left; never more than `max_iterations`. `give_up`:
+        options, and the most `steps` are those left; never more than `max_iterations`. `check_c`:
         end after a first step from zero that shows c to overestimate the stiffness. `exact`:
         iterative solvers go to their own tolerance, without a forcing term.
         """
@@ -107,7 +107,7 @@ class SemismoothNewton:
             return state, monitor.outcome()
         step.begin()
         # At zero strain the secant is the tangent.
-        tangent = state.near and not linear
+        tangent = state.starts_with_tangent and not linear
         for _ in range(min(options.max_iterations, self.steps_left if steps is None else steps)):
             previous = monitor.iterate
             taken = step(problem, previous, tangent, exact)
@@ -120,9 +120,9 @@ class SemismoothNewton:
             if rejected:
                 state = replace(previous.state, secant_at=None)
                 monitor.evaluate(state)
-            if (ended := monitor.ended()) is not None:
-                return ended
-            if give_up and previous.state.active_set is None:
+            if (end := monitor.end()) is not None:
+                return end
+            if check_c and previous.state.active_set is None:
                 if _overestimates_stiffness(problem, step.parameters.c, state):
                     return state, monitor.outcome(OVERESTIMATED)
             if not linear:
@@ -164,7 +164,7 @@ class ConvergenceMonitor:
     @property
     def converged(self) -> bool:
         """Whether the residuals of the last iterate are below tolerance, or rounding."""
-        return not self.residuals.excess(self._options.allowed)
+        return not self.residuals.unmet(self._options.allowed)
 
     def evaluate(self, state: State) -> None:
         """Evaluate the residuals of an iterate. Collective."""
@@ -177,7 +177,7 @@ class ConvergenceMonitor:
         sizes = _node_counts(self.iterate.state, self._problem)
         self._semismooth.recorder.record(self.residuals, note, sizes=sizes, steps=steps)
 
-    def ended(self) -> End | None:
+    def end(self) -> End | None:
         """Return the end by convergence, divergence, or loss of contact; else None. Collective."""
         state = self.iterate.state
         if self.converged:

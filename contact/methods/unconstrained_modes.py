@@ -227,7 +227,7 @@ def with_least_displacements(
         # A method may stall on contact forces that are rounding.
         free = replace(state, multipliers=Multipliers.zero(problem.interface.nodes))
         residuals = evaluate(problem, free)
-        if residuals.excess(outcome.allowed):
+        if residuals.unmet(outcome.allowed):
             return state, outcome
         state, outcome = free, replace(outcome, residuals=residuals)
     free_motion = modes.free_motion(problem, state)
@@ -238,7 +238,7 @@ def with_least_displacements(
     for multipliers in (Multipliers.zero(problem.interface.nodes), state.multipliers):
         least = replace(state, x=x, multipliers=multipliers)
         residuals = evaluate(problem, least)
-        if not residuals.excess(outcome.allowed):
+        if not residuals.unmet(outcome.allowed):
             outcome = replace(outcome, residuals=residuals)
             pressed = problem.interface.nodes.maximum(state.multipliers.contact) > 0
             if pressed and multipliers is not state.multipliers:

@@ -298,7 +298,7 @@ class ContactProblem:
             layer=joined_layers([contact.compliant_layer for contact in self.contacts], geometries),
             conductor=joined_conductors(conductors, [geometry.nodes for geometry in geometries]),
             phi_scale=body.phi_scale,
-            c_0=young / self.domain.size,
+            reference_stiffness=young / self.domain.size,
         )
         frictions = [contact.friction or Friction() for contact in self.contacts]
         facets = [self.domain.facets(contact.on) for contact in self.contacts]
@@ -310,8 +310,8 @@ class ContactProblem:
             fixed_conducting=joined_fixed_conducting(
                 conductors, geometries, law, body.layout.index_map.local_range[0]
             ),
-            c_0=young / self.domain.size,
-            stiffness=young / sizes[self.entry_numbers],
+            reference_stiffness=young / self.domain.size,
+            c_0=young / sizes[self.entry_numbers],
             size=self.domain.size,
             elongation=max(elongation(self.domain.mesh, part) for part in facets),
             connected_component=body.component_norms.connected_component[nodes.nodes],
@@ -325,7 +325,7 @@ class ContactProblem:
             return
         acting = [nodes.normal]
         if any(contact.friction and contact.friction.acts for contact in self.contacts):
-            acting += list(np.moveaxis(nodes.tangent, 2, 0))
+            acting += list(np.moveaxis(nodes.tangential_projector, 2, 0))
         along = np.zeros((len(body.free), self.dim, len(acting)))
         for k, vectors in enumerate(acting):
             into = np.zeros_like(body.owned_part(body.zero_displacement()))

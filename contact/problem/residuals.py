@@ -41,7 +41,7 @@ MARGIN = 4.0
 class Residuals:
     """Relative residuals of equilibrium, contact and friction.
 
-    They are accepted where r_i <= max(tol_i, floor_i) for each of the three (`excess`); `granted`
+    They are accepted where r_i <= max(tol_i, floor_i) for each of the three (`unmet`); `granted`
     names one with tol_i < r_i <= floor_i. The tolerances tol_i are `Residuals` too.
 
     Attributes
@@ -92,7 +92,7 @@ class Residuals:
     def _values(self) -> tuple[float, float, float]:
         return self.equilibrium, self.contact, self.friction
 
-    def excess(self, allowed: Residuals) -> str:
+    def unmet(self, allowed: Residuals) -> str:
         """Name the residual farthest above its tolerance, or floor if that is larger; or ""."""
         ratios = {
             name: getattr(self, name) / max(getattr(allowed, name), floor)
@@ -197,7 +197,9 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
     """
     jump, multiplier = interface.nodes.jump(state.x), state.multipliers.contact
     rounding_stress = interface.rounding_stress(jump)
-    on = constraint_active(multiplier, interface.normal_gap(jump), interface.c_0, rounding_stress)
+    on = constraint_active(
+        multiplier, interface.normal_gap(jump), interface.reference_stiffness, rounding_stress
+    )
     pressed = interface.norms(interface.pressure(jump, state.multipliers) - multiplier * ~on)
     in_contact = (pressed > 0) & (pressed > EPS * pressed.max())
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=in_contact).max())

@@ -113,7 +113,7 @@ class Group:
     @cached_property
     def tangential(self) -> Array:
         """Tangential jumps of the modes, shape (n, d, m). Collective."""
-        return np.einsum("nij,njm->nim", self.problem.nodes.tangent, self._at_contact)
+        return np.einsum("nij,njm->nim", self.problem.nodes.tangential_projector, self._at_contact)
 
     def constraints(self, friction: bool, at: NDArray[np.bool_] | slice = slice(None)) -> Array:
         """Return the Gram matrix of the modes at supports and contact nodes, (m, m). Collective.

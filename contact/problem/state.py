@@ -48,8 +48,8 @@ class State:
             array.flags.writeable = False
 
     @property
-    def near(self) -> bool:
-        """Whether the solution is taken to be near: the first linearisation is the tangent."""
+    def starts_with_tangent(self) -> bool:
+        """Whether the first linearisation is the tangent: the solution is taken to be near."""
         return self.active_set is not None and self.secant_at is None
 
 

@@ -69,10 +69,12 @@ def uniqueness(
     jump = nodes.jump(state.x)
     pressure = interface.pressure(jump, state.multipliers)
     rounding_stress = interface.negligible(jump, pressure)
-    closed = constraint_active(pressure, interface.normal_gap(jump), interface.c_0, rounding_stress)
+    closed = constraint_active(
+        pressure, interface.normal_gap(jump), interface.reference_stiffness, rounding_stress
+    )
     if nodes.maximum(closed.astype(float)) == 0:
         closed = interface.gap <= EPS * interface.size
-    mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(jump))
+    mu = friction.by_pressure(interface.slip_length(jump), np.maximum(pressure, EPS))
     condensation = condensation or Condensation(problem, Counters())
     stiffness = condensation.stiffness(state)
     if stiffness is None:
@@ -92,7 +94,7 @@ def uniqueness(
         (
             *(
                 nodes.admissible_normal,
-                nodes.tangent,
+                nodes.tangential_projector,
                 state.multipliers.friction,
                 closed,
                 mu,

@@ -165,7 +165,7 @@ class OuterLoop(ABC):
         jump = interface.nodes.jump(self.state.x)
         if iteration == 0:  # frictionless start: bound of zero slip
             pressure = interface.pressure(jump, multipliers)
-            self.bound = interface.friction.bound(pressure, np.zeros_like(pressure))
+            self.bound = interface.friction.bound(np.zeros_like(pressure), pressure)
         else:
             self.bound = interface.bound(jump, multipliers)
         size = interface.nodes.norm(self.bound)

@@ -108,13 +108,13 @@ class PenalisedLaw:
         block = np.zeros((*nodes.normal.shape, nodes.block_size))
         in_space = block[:, :, : nodes.dim]
         in_space += slope[:, None, None] * outer(nodes.normal, nodes.normal)
-        in_space += modulus[:, None, None] * nodes.tangent
+        in_space += modulus[:, None, None] * nodes.tangential_projector
         if self._modulus is not None:
             return block
         slip, unit = interface.slip_length(jump), unit_vectors(interface.slip(jump))
-        total, share = interface.pressure(jump, multipliers), slip / (slip + self._eps.slip)
-        along = (interface.friction.by_slip(total, slip) - modulus) * share
-        across = interface.friction.by_pressure(total, slip) * share
+        pressure, share = interface.pressure(jump, multipliers), slip / (slip + self._eps.slip)
+        along = (interface.friction.by_slip(slip, pressure) - modulus) * share
+        across = interface.friction.by_pressure(slip, pressure) * share
         in_space += along[:, None, None] * outer(unit, unit)
         # The layer's pressure bounds friction too, and grows with the potential.
         growth = interface.foundation.layer_gradient(jump)

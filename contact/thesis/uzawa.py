@@ -71,7 +71,7 @@ def augmentation(nodes: ContactNodes, r: float, friction: bool) -> Array:
     blocks = np.zeros((n, nodes.block_size, nodes.block_size))
     blocks[:, :d, :d] = nodes.normal[:, :, None] * nodes.normal[:, None, :]
     if friction:
-        blocks[:, :d, :d] += nodes.tangent
+        blocks[:, :d, :d] += nodes.tangential_projector
     return r * blocks
 
 

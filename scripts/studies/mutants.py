@@ -164,7 +164,7 @@ MUTANTS = (
         "tangent-without-slope",
         "the derivative of mu(slip) in Newton's matrix",
         "contact/methods/safeguards.py",
-        "return np.maximum(interface.friction.by_slip(total, length), -limit)",
+        "return np.maximum(interface.friction.by_slip(length, pressure), -limit)",
         "return np.zeros_like(length)",
         ("tests/interface/test_complementarity.py",),
     ),
@@ -196,9 +196,9 @@ MUTANTS = (
     Mutant(
         "adjoint-of-slip",
         "the sign of accumulated slip in the adjoint of several steps",
-        "contact/problem/linearised.py",
-        'accumulated = -np.einsum("ni,ni->n", linearised.by_length, conditions)',
-        'accumulated = np.einsum("ni,ni->n", linearised.by_length, conditions)',
+        "contact/problem/solution_jacobian.py",
+        'accumulated = -np.einsum("ni,ni->n", jacobian.by_length, conditions)',
+        'accumulated = np.einsum("ni,ni->n", jacobian.by_length, conditions)',
         ("tests/test_derivatives.py",),
     ),
     Mutant(
@@ -213,8 +213,8 @@ MUTANTS = (
         "derivative-without-history",
         "the tangent of several steps: history carried along",
         "contact/derivatives/by_parameters.py",
-        "linearised.solve(change + by_history)",
-        "linearised.solve(change)",
+        "jacobian.solve(change + by_history)",
+        "jacobian.solve(change)",
         ("tests/test_derivatives.py",),
     ),
     Mutant(

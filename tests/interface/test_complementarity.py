@@ -28,7 +28,9 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     n, nodes = nodal.shape[0], problem.nodes
     multipliers = Multipliers(
         rng.uniform(0.5, 1.0, n),
-        np.einsum("nij,nj->ni", nodes.tangent, 0.3 * rng.standard_normal((n, dimension))),
+        np.einsum(
+            "nij,nj->ni", nodes.tangential_projector, 0.3 * rng.standard_normal((n, dimension))
+        ),
     )
     parameters = ComplementarityParameters(20.0, 20.0, 20.0)
     none = np.zeros(n, dtype=bool)
@@ -45,8 +47,8 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
 
     def linearised(nodal):
         pressure, length = interface.pressure(nodal, multipliers), interface.slip_length(nodal)
-        s = interface.friction.bound(pressure, length)
-        bound = LinearisedBound(s, interface.friction.by_pressure(pressure, length), zero)
+        s = interface.friction.bound(length, pressure)
+        bound = LinearisedBound(s, interface.friction.by_pressure(length, pressure), zero)
         return linearise(interface, nodal, multipliers, active, parameters, bound)
 
     (base, blocks), (moved, _) = linearised(nodal), linearised(nodal + direction)
@@ -76,8 +78,8 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
         s, length = interface.bound(nodal, multipliers), interface.slip_length(nodal)
         active, raised = guarded_active_set(interface, nodal, multipliers, s, parameters.c, before)
         assert active.same(before)
-        by_slip = bound_by_slip(interface, pressure, length, limit)
-        bound = LinearisedBound(s, interface.friction.by_pressure(pressure, length), by_slip)
+        by_slip = bound_by_slip(interface, length, pressure, limit)
+        bound = LinearisedBound(s, interface.friction.by_pressure(length, pressure), by_slip)
         return linearise(interface, nodal, raised, active, parameters, bound)
 
     step = np.array([1e-8, 0.0])

@@ -16,7 +16,7 @@ from tests.problems.mechanics import constant
 
 COMM = MPI.COMM_WORLD
 APART = 0.05
-ARRAYS = ("weight", "normal", "admissible_normal", "tangent", "gap", "deviation")
+ARRAYS = ("weight", "normal", "admissible_normal", "tangential_projector", "gap", "deviation")
 
 
 def shifted(x):

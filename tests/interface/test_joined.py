@@ -102,7 +102,7 @@ def test_the_smoothed_pressure_stays_on_its_foot() -> None:
     problem = build_problem(case(contact))
     sizes = [geometry.nodes.nodes.size for geometry in problem.geometries]
     pressure = np.repeat([1.0, 3.0], sizes)
-    bound = problem.interface.friction.bound(pressure, np.zeros(sum(sizes)))
+    bound = problem.interface.friction.bound(np.zeros(sum(sizes)), pressure)
     np.testing.assert_allclose(bound, 0.3 * pressure, rtol=1e-12)
 
 

@@ -78,7 +78,7 @@ def test_a_concentric_arc_has_a_constant_gap():
 @pytest.mark.core
 def test_tangents_project_onto_the_free_tangential_directions():
     for nodes in (on_arch(flat()), leaning_block(MPI.COMM_SELF, 2, 2).nodes):
-        t = nodes.tangent
+        t = nodes.tangential_projector
         assert np.einsum("nij,njk->nik", t, t) == pytest.approx(t, abs=1e-14)
         assert np.abs(np.einsum("nij,nj->ni", t, nodes.normal)).max() < 1e-14
         assert np.einsum("nii->n", t) == pytest.approx(nodes.dim - 1)
@@ -119,7 +119,7 @@ def test_a_direction_that_is_partly_fixed(prescribed, degree):
     nodes = problem.nodes
     assert nodes.normal == pytest.approx(np.tile(-normal, (nodes.size, 1)))
     assert nodes.admissible_normal == pytest.approx(np.tile([0.0, -1 / normal[1]], (nodes.size, 1)))
-    assert np.abs(nodes.tangent).max() == 0
+    assert np.abs(nodes.tangential_projector).max() == 0
     loop = solve(problem, 1e-10)
     u = problem.nodal(loop.state)
     assert u[:, 0] == pytest.approx(prescribed)

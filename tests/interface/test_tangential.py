@@ -108,7 +108,7 @@ def test_tangential_part_of_a_displacement_nearly_along_the_normal(dim):
     normal = rng.standard_normal(nodes.normal.shape)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     tangent = np.eye(dim) - normal[:, :, None] * normal[:, None, :]
-    nodes = replace(nodes, normal=normal, tangent=tangent)
+    nodes = replace(nodes, normal=normal, tangential_projector=tangent)
     small = np.einsum("nij,nj->ni", tangent, rng.standard_normal(normal.shape))
     part = nodes.tangential_component(normal + 1e-9 * small)
     size = np.linalg.norm(part, axis=1)

@@ -188,7 +188,7 @@ def test_every_node_has_one_owner_and_full_weight(comm):
         nodes = leaning_block(comm, 2, degree).nodes
         alone = leaning_block(MPI.COMM_SELF, 2, degree).nodes
         order = [np.lexsort(np.round(t.gather(t.points), 9).T) for t in (nodes, alone)]
-        for quantity in ("points", "weight", "normal", "gap", "tangent"):
+        for quantity in ("points", "weight", "normal", "gap", "tangential_projector"):
             ours, theirs = (
                 t.gather(getattr(t, quantity))[o]
                 for t, o in zip((nodes, alone), order, strict=True)

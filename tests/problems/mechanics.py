@@ -263,7 +263,7 @@ def contact_data(loop: FixedPoint) -> dict[str, Array]:
     problem, nodes, multipliers = loop.problem, loop.problem.nodes, loop.state.multipliers
     nodal = problem.nodal(loop.state)
     slip = nodes.tangential_component(nodal)
-    bound = problem.interface.friction.bound(multipliers.contact, np.linalg.norm(slip, axis=1))
+    bound = problem.interface.friction.bound(np.linalg.norm(slip, axis=1), multipliers.contact)
     size = np.linalg.norm(multipliers.friction, axis=1)
     local = {
         "points": nodes.points,

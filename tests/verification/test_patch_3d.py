@@ -54,4 +54,4 @@ def test_a_fixed_node_carries_no_contact_and_a_fixed_direction_slips_as_given():
     assert ContactProblem(domain, clamped, Contact("bottom", flat())).nodes.size == 4
     nodes = ContactProblem(domain, symmetric, Contact("bottom", flat())).nodes
     assert nodes.size == 5
-    assert np.abs(nodes.tangent - np.diag([1.0, 0.0])).max() < 1e-14
+    assert np.abs(nodes.tangential_projector - np.diag([1.0, 0.0])).max() < 1e-14

@@ -6,13 +6,14 @@ lambda = lambda_c nu + lambda_f of the nodes (f in the code) satisfy smooth equa
     F(x) + P(T x) - f + T^T W lambda = 0,     C(T x, lambda) = 0,
 
 with the forces P of layer and charge: equilibrium and, node by node, one vector condition:
-lambda = 0 (open), gap - u_nu = 0 (in contact), u_tau = 0 (stick),
-lambda_f = s u_tau/|u_tau| (slip).
-`Linearised` solves with their derivative, the Jacobian J = [[K, T^T W], [C_u T, C_f]], and with its
-transpose. lambda is condensed node by node, with gamma as in
-Newton's method; the remainder that gamma leaves in C is corrected by further back-substitutions
-with the same factorisation (augmented Lagrangian iterations), and so is the coupling of the nodes
-by a smoothed pressure.
+lambda_c = 0 and lambda_f = 0 (open), u_nu - gap = 0 (in contact), u_tau = 0 (stick),
+lambda_f = s u_tau/|u_tau| (slip); gaps and slips times `Interface.reference_stiffness`. An open
+node with a friction bound sticks or slips too, with lambda_c = 0.
+`SolutionJacobian` solves with their derivative, the Jacobian J = [[K, T^T W], [C_u T, C_f]], and
+with its transpose. lambda is eliminated node by node, with gamma as in Newton's method; the
+remainder that gamma leaves in C is corrected by further back-substitutions with the same
+factorisation (augmented Lagrangian iterations), and so is the coupling of the nodes by a smoothed
+pressure.
 
 In an evolution a step ends with x and the history h' = H(x, h), and its equations
 G(x, lambda, h) = 0 have the history h at its beginning. The tangent goes forwards,
@@ -54,8 +55,8 @@ class Equations:
     forces
         On the owned free unknowns, global ones behind them.
     conditions
-        At the contact nodes, shape (n, d): stresses, or gaps and slips times the interface's
-        c_0.
+        At the contact nodes, shape (n, d): stresses, or gaps and slips times
+        `Interface.reference_stiffness`.
     """
 
     forces: Array
@@ -78,12 +79,12 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     vectors = state.multipliers.vectors(nodes)
     slip, pressure = interface.slip(jump), interface.pressure(jump, state.multipliers)
     length = np.linalg.norm(slip, axis=1)
-    bound = interface.friction.bound(pressure, length)
+    bound = interface.friction.bound(length, pressure)
     along = unit_vectors(slip)
     friction = nodes.tangential_component(vectors)
     slides = friction - np.where(active.slips, bound, 0.0)[:, None] * along
-    tangential = np.where(active.sticks[:, None], interface.c_0 * slip, slides)
-    closing = -interface.c_0 * interface.normal_gap(jump)
+    tangential = np.where(active.sticks[:, None], interface.reference_stiffness * slip, slides)
+    closing = -interface.reference_stiffness * interface.normal_gap(jump)
     normal = np.where(active.closed, closing, nodes.normal_component(vectors))
     conditions = normal[:, None] * nodes.normal + tangential
     # Forces on nodes of a rigid part as forces on it: a parameter may be its moment arm.
@@ -96,7 +97,7 @@ def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float
     body, nodes, scales = problem.body, problem.nodes, problem.scales
     least = WEAK * scales.young * scales.area
     forces = body.norm(body.internal_forces(state)) + body.norm(body.external(state.time))
-    moved = problem.interface.c_0 * problem.nodal(state)[:, : problem.dim]
+    moved = problem.interface.reference_stiffness * problem.nodal(state)[:, : problem.dim]
     stresses = nodes.norm(moved) + nodes.norm(state.multipliers.vectors(nodes))
     return forces + least, stresses + least / scales.area**0.5
 
@@ -108,7 +109,7 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     of the layer's stiffness: there the solution has one-sided derivatives only.
     """
     interface, jump, multipliers = problem.interface, problem.nodal(state), state.multipliers
-    active, c = active_set(problem, state), interface.c_0
+    active, c = active_set(problem, state), interface.reference_stiffness
     moved = c * np.linalg.norm(jump[:, : problem.dim], axis=1)
     small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(jump, multipliers), moved))
     normal_gap, length = np.abs(interface.normal_gap(jump)), interface.slip_length(jump)
@@ -122,8 +123,8 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     return problem.nodes.gather(problem.nodes.points[weak])
 
 
-class Linearised:
-    """The linearised equations at a solution, factorised once.
+class SolutionJacobian:
+    """The Jacobian of the equations at a solution, factorised once: for derivatives of results.
 
     In an evolution problem and state are those of one step. The complementarity parameters give
     gamma; `active` is the active set of the solution.
@@ -144,10 +145,10 @@ class Linearised:
         self._conditions(jump)
         regular = self._by_force.copy()
         normal = nodes.normal[:, :, None] * nodes.normal[:, None, :]
-        small = interface.c_0 / parameters.gamma
+        small = interface.reference_stiffness / parameters.gamma
         regular -= np.where(self.active.closed, small, 0.0)[:, None, None] * normal
         sticks = np.where(self.active.sticks, small, 0.0)
-        regular -= sticks[:, None, None] * nodes.tangent
+        regular -= sticks[:, None, None] * nodes.tangential_projector
         self._regular = np.linalg.inv(regular)
         d = nodes.dim
         law[:, :d] -= self._regular @ self._by_jump
@@ -164,9 +165,9 @@ class Linearised:
         along = slip / size[:, None]
         normal = nodes.normal[:, :, None] * nodes.normal[:, None, :]
         friction, closed = interface.friction, active.closed[:, None, None]
-        bound = friction.bound(self._pressure, length)
-        across = nodes.tangent - along[:, :, None] * along[:, None, :]
-        by_slip = friction.by_slip(self._pressure, length)
+        bound = friction.bound(length, self._pressure)
+        across = nodes.tangential_projector - along[:, :, None] * along[:, None, :]
+        by_slip = friction.by_slip(length, self._pressure)
         turning = (bound / size)[:, None, None] * across
         falls = turning + by_slip[:, None, None] * (along[:, :, None] * along[:, None, :])
         slips, sticks = active.slips[:, None, None], active.sticks[:, None, None]
@@ -180,17 +181,21 @@ class Linearised:
         self._layer = interface.foundation.layer_gradient(jump)
         local = self._rate * friction.local
         self._by_jump = np.zeros((length.size, d, nodes.block_size))
-        self._by_jump[:, :, :d] = np.where(closed, interface.c_0 * normal, 0.0)
+        self._by_jump[:, :, :d] = np.where(closed, interface.reference_stiffness * normal, 0.0)
         #: Derivative of the conditions by the slip alone, and by its length.
-        self.by_slip = np.where(sticks, interface.c_0 * nodes.tangent, 0.0)
+        self.by_slip = np.where(
+            sticks, interface.reference_stiffness * nodes.tangential_projector, 0.0
+        )
         self.by_slip -= np.where(slips, falls, 0.0)
         self.by_length = -by_slip[:, None] * self._along
         self._by_jump[:, :, :d] += self.by_slip
         self._by_jump -= (local[:, None] * self._along)[:, :, None] * self._layer[:, None, :]
         pressed = (local[:, None] * self._along)[:, :, None] * nodes.normal[:, None, :]
-        self._by_force = np.where(closed, 0.0, normal) + np.where(sticks, 0.0, nodes.tangent)
+        self._by_force = np.where(closed, 0.0, normal) + np.where(
+            sticks, 0.0, nodes.tangential_projector
+        )
         # No contact force along fixed components.
-        self._by_force += np.eye(d) - normal - nodes.tangent
+        self._by_force += np.eye(d) - normal - nodes.tangential_projector
         self._by_force -= pressed
 
     def solve(self, change: Equations) -> tuple[Array, Array]:
@@ -304,9 +309,9 @@ def moved_state(problem: ContactProblem, state: State, x: Array, f: Array) -> St
     return replace(state, x=problem.body.updated(state.x, x), multipliers=multipliers)
 
 
-def commit_along(linearised: Linearised, x: Array, change: History) -> History:
+def commit_along(jacobian: SolutionJacobian, x: Array, change: History) -> History:
     """Return dh' = dH/dx dx + dH/dh dh, given dx of the owned unknowns and dh. Collective."""
-    problem, state = linearised.problem, linearised.state
+    problem, state = jacobian.problem, jacobian.state
     slip, variables = _parts(change)
     along = problem.body.local(x)
     jump = problem.nodes.tangential_component(problem.nodes.jump(along))
@@ -317,12 +322,12 @@ def commit_along(linearised: Linearised, x: Array, change: History) -> History:
     return History(parts)
 
 
-def before_along(linearised: Linearised, change: History) -> Equations:
+def before_along(jacobian: SolutionJacobian, change: History) -> Equations:
     """Return dG/dh dh. Collective."""
-    problem, state = linearised.problem, linearised.state
+    problem, state = jacobian.problem, jacobian.state
     slip, variables = _parts(change)
-    conditions = linearised.by_length * slip.accumulated[:, None]
-    conditions -= np.einsum("nij,nj->ni", linearised.by_slip, slip.jump)
+    conditions = jacobian.by_length * slip.accumulated[:, None]
+    conditions -= np.einsum("nij,nj->ni", jacobian.by_slip, slip.jump)
     if variables is None:
         return Equations(np.zeros_like(problem.body.owned_part(state.x)), conditions)
     problem.body.laws.before_along(state, variables)
@@ -345,16 +350,16 @@ def commit_transposed(problem: ContactProblem, state: State, after: History) -> 
 
 
 def before_transposed(
-    linearised: Linearised, along: Array, conditions: Array, after: History | None
+    jacobian: SolutionJacobian, along: Array, conditions: Array, after: History | None
 ) -> History:
     """Return (dH/dh)^T g - (dG/dh)^T w. Collective.
 
     w is given as `along`, by the internal forces on the owned unknowns, and `conditions`; g are the
     derivatives by h' `after` the step, None for the last one.
     """
-    problem, state = linearised.problem, linearised.state
-    jump = np.einsum("nji,nj->ni", linearised.by_slip, conditions)
-    accumulated = -np.einsum("ni,ni->n", linearised.by_length, conditions)
+    problem, state = jacobian.problem, jacobian.state
+    jump = np.einsum("nji,nj->ni", jacobian.by_slip, conditions)
+    accumulated = -np.einsum("ni,ni->n", jacobian.by_length, conditions)
     slip, variables = (None, None) if after is None else _parts(after)
     if slip is not None:
         jump -= slip.accumulated[:, None] * _direction(problem, problem.nodal(state))
