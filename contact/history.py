@@ -1,7 +1,7 @@
 """The history at the beginning of a load step: a value with named parts.
 
 A part has arrays at contact nodes (slip) or at quadrature points (internal variables). Checkpoints
-and transfer between meshes use the names and places alone.
+use the names and places alone.
 """
 
 from __future__ import annotations

@@ -105,7 +105,8 @@ def solve(
     comm
         Communicator of the mesh.
     start
-        An earlier solution on the same mesh, or its state, as initial guess; zero by default.
+        An earlier solution on the same mesh, or its state, as initial guess; by default zero, or,
+        of a large static case, a solution on coarser meshes.
     replacements
         Objects that take the place of parts of the case: `domain`, `law`, `coefficient`,
         `friction`, `foundation`, `layer`; see `build_problem`.

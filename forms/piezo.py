@@ -5,8 +5,9 @@ Sign convention, stated once, equations (1.23) and (8.2), with the potential phi
     sigma = F eps(u) + e^T grad(phi),     (e^T grad phi)_jk = e_ijk phi_,i
     D     = e eps(u) - beta grad(phi),    D_i = e_ijk eps_jk - beta_ij phi_,j
 
-A of (5.16), with B of the fixed point, is positive definite and not symmetric: `saddle_form`, after
-the saddle-point matrix [[F, e^T], [-e, beta]] of its rows. It has the quadratic form
+A of (5.16), with B of the fixed point, is positive definite and not symmetric: `saddle_form`, named
+after the structure [[F, e^T], [-e, beta]] of its matrix, that of a saddle-point system with the
+second row negated. It has the quadratic form
 B(x; x, x) = F eps : eps + beta grad(phi) . grad(phi).
 A-check of (5.27), with B-check, is A with xi negated, symmetric and indefinite, its quadratic form
 convex in u and concave in phi, with a saddle point as solution: `symmetrised_form`.

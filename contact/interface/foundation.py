@@ -29,7 +29,7 @@ from forms.laws import PenetrationLaw
 from forms.ops import Value
 
 #: Change of a stiffness within a small penetration, over the larger one, that is a kink of the law;
-#: least one over `reference_stiffness`.
+#: least one over `c_b`.
 KINK, SOFTEST = 0.01, 1e-5
 
 #: A pressure, or a penetration, above zero.
@@ -123,14 +123,14 @@ class ElasticBed:
 class FoundationLaw:
     """Layer and conductor at the contact nodes; potentials come divided by `phi_scale`.
 
-    `reference_stiffness` (stress/length) weighs penetrations against pressures.
+    `c_b` (stress/length) weighs penetrations against pressures.
     """
 
     nodes: ContactNodes
     layer: Layer | None
     conductor: Conductor | None
     phi_scale: float
-    reference_stiffness: float
+    c_b: float
 
     @property
     def active(self) -> bool:
@@ -277,16 +277,14 @@ class FoundationLaw:
     def resting(self, jump: Array) -> Array:
         """Return pressures just above rounding, shape (n,), which mark fixed nodes as closed."""
         reach = np.abs(self.nodes.gap) + np.linalg.norm(jump[:, : self.nodes.dim], axis=1)
-        return np.maximum(1e-12 * self.reference_stiffness * reach, TINY)
+        return np.maximum(1e-12 * self.c_b * reach, TINY)
 
     def _pressed(self, jump: Array, pressure: Array) -> NDArray[np.bool_]:
         """Return where the rigid part presses, shape (n,)."""
         # u_nu = rho holds to the tolerance of the inner loop, which a steep ramp makes a thousand
         # times larger; so large a multiplier at an open node is no pressure.
         normal_gap = self.signorini_gap - self.nodes.normal_component(jump)
-        return constraint_active(
-            pressure - self.layer_pressure(jump), normal_gap, self.reference_stiffness
-        )
+        return constraint_active(pressure - self.layer_pressure(jump), normal_gap, self.c_b)
 
     def force(self, jump: Array, pressure: Array) -> Array:
         """Return the residual density on Gamma_3, shape (n, block size), in scaled unknowns."""
@@ -304,7 +302,7 @@ class FoundationLaw:
         before, after = (
             np.abs(stiffness * self.layer.p_nu.derivative(s + way)) for way in (-reach, reach)
         )
-        least = np.maximum(KINK * np.maximum(before, after), SOFTEST * self.reference_stiffness)
+        least = np.maximum(KINK * np.maximum(before, after), SOFTEST * self.c_b)
         return np.asarray(np.abs(after - before) > least)
 
     def layer_gradient(self, jump: Array) -> Array:

@@ -44,14 +44,15 @@ class Interface:
     """Unilateral contact, friction, layer and surface charge at the owned contact nodes.
 
     Its methods take jumps T x of shape (n, block size): of displacements, then of the scaled
-    potential (`ContactNodes.jump`). In front of a fixed foundation these are the nodal unknowns.
+    potential (`ContactNodes.jump`). In front of a fixed foundation these are the nodal unknowns,
+    or D u (`ContactNodes.coupling`).
 
     Attributes
     ----------
     nodes
         The contact nodes.
     gap
-        rho of the unilateral constraint, shape (n,), which methods change: g_0 of the nodes
+        Of the unilateral constraint, shape (n,), which methods change: rho of the nodes
         (`ContactNodes.gap`), or infinite without one, as behind a layer without a rigid part, and
         at nodes outside of a working set.
     foundation
@@ -60,7 +61,7 @@ class Interface:
         Friction.
     fixed_conducting
         The charge at nodes without a free displacement, but with a free potential, or None.
-    reference_stiffness
+    c_b
         E/size, E behind Gamma_3: the complementarity parameter with which the active set of a
         solution is told (stress/length).
     c_0
@@ -83,7 +84,7 @@ class Interface:
     foundation: FoundationLaw
     friction: NodalFriction
     fixed_conducting: FoundationLaw | None
-    reference_stiffness: float
+    c_b: float
     c_0: Array
     size: float
     elongation: float
@@ -201,10 +202,10 @@ class Interface:
     ) -> ActiveSet:
         """Return the active set: open, stick, slip.
 
-        `c` and `rounding_stress` are those of `constraint_active`; c is `reference_stiffness` by
+        `c` and `rounding_stress` are those of `constraint_active`; c is `c_b` by
         default.
         """
-        c = self.reference_stiffness if c is None else c
+        c = self.c_b if c is None else c
         closed = constraint_active(multipliers.contact, self.normal_gap(jump), c, rounding_stress)
         if not self.friction.acts:
             return ActiveSet.without_slip(closed, False)
@@ -223,7 +224,7 @@ class Interface:
     def rounding_stress(self, jump: Array) -> float:
         """Return the pressure of a rounding of the displacements (stress). Collective."""
         displacement = np.abs(jump[:, : self.nodes.dim]).max(axis=1, initial=0.0)
-        return 2 * ROUNDING * self.reference_stiffness * self.nodes.maximum(displacement)
+        return 2 * ROUNDING * self.c_b * self.nodes.maximum(displacement)
 
     def negligible(self, jump: Array, pressure: Array) -> float:
         """Return the rounding of pressures, by displacements or the largest one. Collective."""

@@ -6,8 +6,8 @@ and a coefficient mu(slip) depends on the accumulated one. A static problem is o
 
 The active set says which contact nodes are open, stick or slip. A node is in contact where
 lambda_c - c (rho - u_nu) > 0 and sticks where |lambda_f + c u_tau| <= s: the pieces of the
-complementarity functions (`contact.interface.complementarity`). Newton's method, the residuals and
-the status have a c each: the sets agree at the solution.
+complementarity functions (`contact.interface.complementarity`). Newton's method has the c of
+(20), the results have c_b (`Interface`): the sets agree at the solution.
 """
 
 from __future__ import annotations

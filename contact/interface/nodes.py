@@ -84,9 +84,8 @@ class ContactNodes:
         them. The other jumps are no unknowns there, as on a plane of symmetry, and the supports
         bear the friction.
     gap
-        g_0, the geometric gap: the distance along the contact direction, shape (n,); infinite at
-        nodes that face nothing. Methods change the gap rho of the constraint alone
-        (`Interface.gap`).
+        The gap rho: the distance along the contact direction, shape (n,); infinite at nodes that
+        face nothing. Methods change that of the constraint alone (`Interface.gap`).
     deviation
         Of a curved surface from its facets, without the part in the gaps, shape (n,) (length).
     block_size
@@ -123,7 +122,8 @@ class ContactNodes:
     def jump(self, x: Array) -> Array:
         """Return the jumps T x, shape (n, block_size), of a local dof array. Collective.
 
-        In front of a foundation these are the nodal unknowns, relative to it if it moves.
+        In front of a foundation these are the nodal unknowns, or D u on quadratic triangles and
+        beside the axis, relative to it if it moves.
         """
         values = self._nodal(x)
         jump = values[self.nodes]

@@ -318,7 +318,7 @@ SMOOTHER = (
     else {"mg_levels_ksp_max_it": "3", "mg_levels_pc_type": "pbjacobi"}
 )
 
-#: Relative tolerance of a linear solve, in the norm of the preconditioner.
+#: Relative tolerance of a linear solve, of the preconditioned residual.
 TOLERANCE = 1e-10
 
 #: Options of MINRES. PETSc's default radius is an absolute norm, at which it ends as if converged;

@@ -1,6 +1,6 @@
 """Solvers of PETSc: setting up, iterative refinement, and messages where they fail.
 
-Residuals of Krylov solvers, in the norm of the preconditioner, are blind where that is nearly
+Preconditioned residuals, by which Krylov solvers end, are blind where the preconditioner is nearly
 singular: for a weakly constrained body the first correction is a huge rigid motion, beside which
 all else is small. `refine` corrects their solutions.
 """

@@ -241,7 +241,7 @@ def _penetrating(
     jump = interface.nodes.jump(state.x)
     depth = np.where(inside, 0.0, -interface.normal_gap(jump))
     deepest = interface.nodes.maximum(depth)
-    rounding_length = interface.rounding_stress(jump) / interface.reference_stiffness
+    rounding_length = interface.rounding_stress(jump) / interface.c_b
     count = int(summed(interface.comm, np.count_nonzero(depth > rounding_length)))
     return deepest, count
 

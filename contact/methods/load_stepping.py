@@ -1,7 +1,8 @@
 """Quasi-static load stepping by any method, with incremental friction.
 
 A step is a static problem with the loads at its end and the history at its beginning. It starts
-from a prediction, and a linear body is factorised once for all steps. A step that fails is halved;
+from a prediction, and a linear body is assembled, and a condensed one factorised, once for
+all steps. A step that fails is halved;
 the steps before it stay. Where the loads grow from zero this is continuation in the load.
 """
 

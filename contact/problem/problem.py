@@ -298,7 +298,7 @@ class ContactProblem:
             layer=joined_layers([contact.compliant_layer for contact in self.contacts], geometries),
             conductor=joined_conductors(conductors, [geometry.nodes for geometry in geometries]),
             phi_scale=body.phi_scale,
-            reference_stiffness=young / self.domain.size,
+            c_b=young / self.domain.size,
         )
         frictions = [contact.friction or Friction() for contact in self.contacts]
         facets = [self.domain.facets(contact.on) for contact in self.contacts]
@@ -310,7 +310,7 @@ class ContactProblem:
             fixed_conducting=joined_fixed_conducting(
                 conductors, geometries, law, body.layout.index_map.local_range[0]
             ),
-            reference_stiffness=young / self.domain.size,
+            c_b=young / self.domain.size,
             c_0=young / sizes[self.entry_numbers],
             size=self.domain.size,
             elongation=max(elongation(self.domain.mesh, part) for part in facets),

@@ -197,9 +197,7 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
     """
     jump, multiplier = interface.nodes.jump(state.x), state.multipliers.contact
     rounding_stress = interface.rounding_stress(jump)
-    on = constraint_active(
-        multiplier, interface.normal_gap(jump), interface.reference_stiffness, rounding_stress
-    )
+    on = constraint_active(multiplier, interface.normal_gap(jump), interface.c_b, rounding_stress)
     pressed = interface.norms(interface.pressure(jump, state.multipliers) - multiplier * ~on)
     in_contact = (pressed > 0) & (pressed > EPS * pressed.max())
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=in_contact).max())

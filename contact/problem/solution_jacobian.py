@@ -7,7 +7,7 @@ lambda = lambda_c nu + lambda_f of the nodes (f in the code) satisfy smooth equa
 
 with the forces P of layer and charge: equilibrium and, node by node, one vector condition:
 lambda_c = 0 and lambda_f = 0 (open), u_nu - gap = 0 (in contact), u_tau = 0 (stick),
-lambda_f = s u_tau/|u_tau| (slip); gaps and slips times `Interface.reference_stiffness`. An open
+lambda_f = s u_tau/|u_tau| (slip); gaps and slips times `Interface.c_b`. An open
 node with a friction bound sticks or slips too, with lambda_c = 0.
 `SolutionJacobian` solves with their derivative, the Jacobian J = [[K, T^T W], [C_u T, C_f]], and
 with its transpose. lambda is eliminated node by node, with gamma as in Newton's method; the
@@ -56,7 +56,7 @@ class Equations:
         On the owned free unknowns, global ones behind them.
     conditions
         At the contact nodes, shape (n, d): stresses, or gaps and slips times
-        `Interface.reference_stiffness`.
+        `Interface.c_b`.
     """
 
     forces: Array
@@ -83,8 +83,8 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     along = unit_vectors(slip)
     friction = nodes.tangential_component(vectors)
     slides = friction - np.where(active.slips, bound, 0.0)[:, None] * along
-    tangential = np.where(active.sticks[:, None], interface.reference_stiffness * slip, slides)
-    closing = -interface.reference_stiffness * interface.normal_gap(jump)
+    tangential = np.where(active.sticks[:, None], interface.c_b * slip, slides)
+    closing = -interface.c_b * interface.normal_gap(jump)
     normal = np.where(active.closed, closing, nodes.normal_component(vectors))
     conditions = normal[:, None] * nodes.normal + tangential
     # Forces on nodes of a rigid part as forces on it: a parameter may be its moment arm.
@@ -97,7 +97,7 @@ def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float
     body, nodes, scales = problem.body, problem.nodes, problem.scales
     least = WEAK * scales.young * scales.area
     forces = body.norm(body.internal_forces(state)) + body.norm(body.external(state.time))
-    moved = problem.interface.reference_stiffness * problem.nodal(state)[:, : problem.dim]
+    moved = problem.interface.c_b * problem.nodal(state)[:, : problem.dim]
     stresses = nodes.norm(moved) + nodes.norm(state.multipliers.vectors(nodes))
     return forces + least, stresses + least / scales.area**0.5
 
@@ -109,7 +109,7 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     of the layer's stiffness: there the solution has one-sided derivatives only.
     """
     interface, jump, multipliers = problem.interface, problem.nodal(state), state.multipliers
-    active, c = active_set(problem, state), interface.reference_stiffness
+    active, c = active_set(problem, state), interface.c_b
     moved = c * np.linalg.norm(jump[:, : problem.dim], axis=1)
     small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(jump, multipliers), moved))
     normal_gap, length = np.abs(interface.normal_gap(jump)), interface.slip_length(jump)
@@ -145,7 +145,7 @@ class SolutionJacobian:
         self._conditions(jump)
         regular = self._by_force.copy()
         normal = nodes.normal[:, :, None] * nodes.normal[:, None, :]
-        small = interface.reference_stiffness / parameters.gamma
+        small = interface.c_b / parameters.gamma
         regular -= np.where(self.active.closed, small, 0.0)[:, None, None] * normal
         sticks = np.where(self.active.sticks, small, 0.0)
         regular -= sticks[:, None, None] * nodes.tangential_projector
@@ -181,11 +181,9 @@ class SolutionJacobian:
         self._layer = interface.foundation.layer_gradient(jump)
         local = self._rate * friction.local
         self._by_jump = np.zeros((length.size, d, nodes.block_size))
-        self._by_jump[:, :, :d] = np.where(closed, interface.reference_stiffness * normal, 0.0)
+        self._by_jump[:, :, :d] = np.where(closed, interface.c_b * normal, 0.0)
         #: Derivative of the conditions by the slip alone, and by its length.
-        self.by_slip = np.where(
-            sticks, interface.reference_stiffness * nodes.tangential_projector, 0.0
-        )
+        self.by_slip = np.where(sticks, interface.c_b * nodes.tangential_projector, 0.0)
         self.by_slip -= np.where(slips, falls, 0.0)
         self.by_length = -by_slip[:, None] * self._along
         self._by_jump[:, :, :d] += self.by_slip

@@ -172,9 +172,7 @@ def unresisted_motions(solution: Results) -> Iterator[Remark]:
         return
     residual = body.unbalanced(residual_forces(problem, solution.state))
     left = float(np.linalg.norm(body.norms(residual)[0]))
-    whole = problem.interface.reference_stiffness * problem.nodes.sum(
-        np.ones_like(problem.nodes.weight)
-    )
+    whole = problem.interface.c_b * problem.nodes.sum(np.ones_like(problem.nodes.weight))
     largest = solution.max_displacement
     accepted = f"{'more ' if problem.frictional else ''}friction, or supports"
     for group, free in modes:

@@ -69,9 +69,7 @@ def uniqueness(
     jump = nodes.jump(state.x)
     pressure = interface.pressure(jump, state.multipliers)
     rounding_stress = interface.negligible(jump, pressure)
-    closed = constraint_active(
-        pressure, interface.normal_gap(jump), interface.reference_stiffness, rounding_stress
-    )
+    closed = constraint_active(pressure, interface.normal_gap(jump), interface.c_b, rounding_stress)
     if nodes.maximum(closed.astype(float)) == 0:
         closed = interface.gap <= EPS * interface.size
     mu = friction.by_pressure(interface.slip_length(jump), np.maximum(pressure, EPS))

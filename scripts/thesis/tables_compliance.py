@@ -150,9 +150,7 @@ def values(solution: Solution) -> dict[str, object]:
     """Return the row of an example. Collective."""
     body, interface = solution.problem.body, solution.problem.interface
     nodes, normal_gap = interface.nodes, interface.normal_gap(solution.nodal)
-    rigid = nodes.gather(
-        solution.multipliers.contact - interface.reference_stiffness * normal_gap > 0
-    )
+    rigid = nodes.gather(solution.multipliers.contact - interface.c_b * normal_gap > 0)
     touching = nodes.gather(solution.status != "open")
     x = nodes.gather(nodes.points[:, 0])[touching]
     unknowns = solution.state.x.reshape(-1, body.block_size)

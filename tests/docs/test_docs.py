@@ -13,7 +13,7 @@ import pytest
 
 import contact
 from contact import refining
-from contact.linear import multigrid
+from contact.linear import multigrid, petsc
 from contact.methods import (
     fallbacks,
     interior_point,
@@ -250,10 +250,11 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"after [{options.stagnation_limit}] steps in which": semismooth.PROGRESS == 0.5,
         f"after [{options.max_iterations}] steps;": True,
         "is [10³] times all loads": semismooth.OVERESTIMATE == 1e3,
-        "limited to [1/4] κ": options.softening == 0.25,
+        "is limited to [1/4] κ": options.softening == 0.25,
         "10^4 \\max(c, \\kappa)": options.gamma == 1e4,
-        "below [1/10] of the\n   largest one": newton_step.SMALL == 0.1,
+        "below [1/10] of the largest one": newton_step.SMALL == 0.1,
         "the forcing term [10⁻²]": newton_step.FORCING == 1e-2,
+        f"At most\n   [{petsc.CORRECTIONS}] corrections follow": True,
         "each three steps": newton_step.STAGNANT == 3,
         "[10^{-2}]\\,\\kappa$ is added": safeguards.REGULARISATION == 1e-2,
         "tolerance is [10⁻³] of the": newton.CONTACT_PART == 1e-3,

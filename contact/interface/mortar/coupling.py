@@ -51,8 +51,8 @@ NOTHING: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 class ModifiedDualBasis:
     """The dual basis Phi'_j = Phi_j + sum_k m_jk Phi_k, without functions of some nodes k.
 
-    These are nodes at crosspoints, or with Dirichlet conditions. With sum_j m_jk = 1 multipliers
-    contain the constants.
+    These are crosspoints, whose displacement along the normal is prescribed, and others without a
+    multiplier. With sum_j m_jk = 1 multipliers contain the constants.
     """
 
     nodes: NDArray[np.int64]  #: global numbers of the nodes j of each facet's functions, (f, k)
