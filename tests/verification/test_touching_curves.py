@@ -16,6 +16,9 @@ from tests.problems.overlapping import ELEMENTS, PLANE, POISSON, SPACE, YOUNG, b
 
 COMM = MPI.COMM_WORLD
 
+#: Cells in the plane; quadrilaterals find what triangles do.
+IN_PLANE = ("triangle", pytest.param("quadrilateral", marks=pytest.mark.slow))
+
 
 @pytest.mark.parallel
 @pytest.mark.parametrize("counts", [(7, 12), (16, 9)])
@@ -29,7 +32,7 @@ def test_ellipses_that_touch_are_accepted(cell, counts):
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("cell", PLANE)
+@pytest.mark.parametrize("cell", IN_PLANE)
 def test_waves_that_touch_are_accepted(cell):
     """Their curvature changes by its own size from facet to facet; deeper is an overlap."""
     for counts in ((6, 4), (4, 7)):
@@ -51,7 +54,7 @@ def of_half_ellipses(cell, order, axis, counts, depth):
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("cell", [*PLANE, "hexahedron"])
+@pytest.mark.parametrize("cell", [*IN_PLANE, "hexahedron"])
 def test_curved_cells_that_turn_are_accepted(cell):
     """Edges of a body are where normals at the ends of its facets differ, not those of chords."""
     for counts in ((4, 5), (5, 9), (4, 13)) if cell in PLANE else ((5, 9),):
