@@ -133,7 +133,7 @@ def draw_line(run: Run) -> Figure:
     for ax in grid[:, 1:].ravel():
         ax.set_ylabel("")
     for ax, part in zip(grid[0] if len(parts) > 1 else [], parts, strict=False):
-        ax.set_title(str(part["on"][0]), fontsize="medium")
+        ax.set_title(run.names[part["entry"][0]], fontsize="medium")
     known: dict[str, Any] = {}
     for ax in grid.ravel():
         known |= {handle.get_label(): handle for handle in ax.get_legend_handles_labels()[0]}

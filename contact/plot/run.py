@@ -44,6 +44,7 @@ class Run:
     body: Any  #: a grid of pyvista
     surface: Any  #: the contact part, likewise
     opposite: Any = None  #: the other sides of contacts between bodies, likewise
+    names: Sequence[str] = ()  #: of the contacts, by their numbers
     regions: Sequence[str] = ()  #: names by the numbers in the field ``region``
     shapes: Mapping[int, Shape] = field(default_factory=dict)  #: those of the case, by contact
     #: Of shapes that move in 3-D the end of the names of their columns, and the centre of rotation.
@@ -121,6 +122,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             body,
             surface,
             opposite=read_grid(folder / OPPOSITE) if OPPOSITE in files else None,
+            names=list(about["contacts"]),
             regions=about.get("regions", ()),
             shapes=shapes,
             moving=moving,

@@ -173,6 +173,7 @@ def areas(run: Run, skin: Any) -> Array:
 class Zone:
     """Where a run is in contact; all of the contact part where it is open."""
 
+    entries: Array  #: numbers of its contacts
     corners: Array  #: the triangles that touch, shape (n, 3, 3)
     area: Array  #: their area vectors, shape (n, 3)
     displacement: Array  #: at the corners, shape (n, 3, 3)
@@ -204,7 +205,7 @@ class Zone:
         normal = normal / np.linalg.norm(normal)
         if abs(normal).max() > SNAPPED:
             normal = np.where(abs(normal) > SNAPPED, np.sign(normal), 0.0)
-        return Zone(corners, area, moved, pressure, normal)
+        return Zone(np.unique(entries), corners, area, moved, pressure, normal)
 
 
 class Sight(NamedTuple):
@@ -374,7 +375,7 @@ def contact_figure(run: Run, look: Look) -> Figure:
     for k, (zone, side, name) in enumerate(closes):
         close = close_camera(zone, side, camera)
         front = seen(run, run.surface, zone, side * zone.normal)
-        meshes = [front, *(seen(run, other, zone) for other in others)]
+        meshes = [front, *(other_side(run, other, zone) for other in others)]
         titles = ["contact pressure", *["on the other side"] * len(others), "status"]
         panels = [
             figure.add_subplot(grid[1 + r, k] if narrow else grid[r, 1 + k]) for r in range(rows)
@@ -420,7 +421,7 @@ def close_ups(run: Run, zone: Zone) -> list[tuple[Zone, int, str]]:
     touching = np.unique(run.table["entry"][run.table["status"] != "open"])
     if 1 < len(touching) <= CLOSE:
         parts = [table for table in run.contacts if table["entry"][0] in touching]
-        return [(Zone.of(run, part["entry"]), 1, str(part["on"][0])) for part in parts]
+        return [(Zone.of(run, part["entry"]), 1, run.names[part["entry"][0]]) for part in parts]
     size = np.linalg.norm(zone.area, axis=1)
     behind = zone.area @ zone.normal < -0.1 * size
     if size[behind].sum() <= 0.02 * size.sum():
@@ -451,6 +452,17 @@ def seen(run: Run, grid: Any, zone: Zone, towards: Array | None = None) -> Any:
         there &= areas(run, skin) @ towards > 0
     front = pyvista.PolyData.from_regular_faces(skin.points, faces[there])
     front.point_data.update(skin.point_data)
+    return front
+
+
+def other_side(run: Run, grid: Any, zone: Zone) -> Any:
+    """Return the triangles of the other side around a zone, with the pressure of its contacts."""
+    front = seen(run, grid, zone)
+    own = np.isin(front["entry"], zone.entries)
+    # Contacts against the same part have a copy of it each.
+    copies = np.unique(front.points, axis=0, return_inverse=True)[1].ravel()
+    whole = np.bincount(copies, np.where(own, front["pressure"], 0.0))
+    front["pressure"] = whole[copies]
     return front
 
 

@@ -6,17 +6,29 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dolfinx.mesh import compute_midpoints
+from mpi4py import MPI
 
+from contact import Body, Contact, Fixed, Linear, Problem
 from contact.cli.main import main
 from contact.cli.plot import direction
+from contact.mesh.domain import from_mesh
 from contact.plot import figures
 from contact.plot.body import picture
 from contact.plot.foundation import foundation
 from contact.plot.run import Run, _foundations
-from contact.plot.space import Camera, Zone, chosen_sight, close_camera, contact_figure
+from contact.plot.space import (
+    Camera,
+    Zone,
+    chosen_sight,
+    close_camera,
+    contact_figure,
+    other_side,
+)
 from contact.plot.style import Look
 from contact.solving import solve
 from contact.writing import write_outputs, written
+from tests.problems.blocks import Blocks
 from tests.problems.written import block
 
 AXES = {"left": -1, "right": 1, "front": -2, "back": 2, "bottom": -3, "top": 3}
@@ -87,6 +99,27 @@ def test_the_other_body_is_translucent_or_both_are_cut_open() -> None:
     normal, origin = opened.cut
     assert abs(normal @ zone.normal) < 1e-9 and normal @ opened.eye > 0
     np.testing.assert_allclose(origin, 0.0, atol=1e-9)
+
+
+def test_the_other_side_shows_the_pressure_of_the_contacts_in_the_view() -> None:
+    """Two contacts have the same part against them: each close-up has that of its own."""
+    blocks = Blocks(dim=3, upper=5).domain(MPI.COMM_SELF)
+    under = blocks.facets("under")
+    x = compute_midpoints(blocks.mesh, 2, under)[:, 0]
+    parts = {name: blocks.facets(name) for name in ("top", "over", "bottom")}
+    domain = from_mesh(blocks.mesh, {**parts, "one": under[x < 0.4], "two": under[x > 0.6]})
+    supports = [Fixed("bottom", [0.0, 0.0, 0.0]), Fixed("top", [0.0, 0.0, -0.01])]
+    contacts = [Contact(name, against="over") for name in ("one", "two")]
+    run = written(solve(Problem(domain, Body(Linear(1.0, 0.3), supports), contacts)))
+    assert run is not None
+    seen = {}
+    for entries in ((0,), (1,), (0, 1)):
+        side = other_side(run, run.opposite, Zone.of(run, np.array(entries)))
+        pressure = np.nan_to_num(side["pressure"])
+        seen[entries] = [pressure[abs(side.points[:, 0] - end) < 0.2].max() for end in (0, 1)]
+    (one, none), (nothing, two) = seen[0,], seen[1,]
+    assert one > 0.005 and two > 0.005 and seen[0, 1] == [one, two]
+    assert none < 0.2 * one and nothing < 0.2 * two
 
 
 SHAPES: dict[str, dict[str, Any]] = {
