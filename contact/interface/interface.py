@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from contact.interface.foundation import FoundationLaw
 from contact.interface.friction import NodalFriction
 from contact.interface.multipliers import ActiveSet, Multipliers, SlipHistory, constraint_active
-from contact.interface.nodes import ContactNodes
+from contact.interface.nodes import ContactNodes, make_read_only
 from contact.mesh.entities import component_sums
 from contact.ranks import summed
 from contact.tolerances import EPS, NEGLIGIBLE, ROUNDING
@@ -91,6 +91,10 @@ class Interface:
     connected_component: NDArray[np.intp]
     connected_components: int
     proximal: Proximal | None = None
+
+    def __post_init__(self) -> None:
+        """Mark the arrays as read-only."""
+        make_read_only(self)
 
     @property
     def c_r(self) -> Array:

@@ -31,6 +31,13 @@ def unit_vectors(vectors: Array) -> Array:
     return np.asarray(vectors / np.where(length > 0, length, 1.0))
 
 
+def make_read_only(value: object) -> None:
+    """Mark the arrays among the attributes of a value as read-only."""
+    for array in vars(value).values():
+        if isinstance(array, np.ndarray):
+            array.flags.writeable = False
+
+
 def contact_directions(
     normal: Array, movable: Array, prescribed: NDArray[np.bool_] | bool = True
 ) -> tuple[Array, Array]:
@@ -113,6 +120,10 @@ class ContactNodes:
     revolved: bool = False
     motion: Array | None = None
     coupling: CouplingOperator | None = None
+
+    def __post_init__(self) -> None:
+        """Mark the arrays as read-only."""
+        make_read_only(self)
 
     @property
     def dim(self) -> int:

@@ -156,9 +156,9 @@ class ContactProblem:
                     f"contact.name: {name!r} is that of several contacts; accepted: one each",
                     "contact-name",
                 )
-        if len(names) > 1 and "nodes" in names:
+        if self.by_contact and "nodes" in names:
             raise InputError(
-                "contact.name: given 'nodes' for one of several contacts; accepted: another name, "
+                "contact.name: given 'nodes'; accepted: another name, "
                 "for the columns stick_nodes and slip_nodes are the numbers of nodes",
                 "contact-name",
             )
@@ -183,6 +183,12 @@ class ContactProblem:
         self.initial = self._history(self.interface.friction.history, self.body.laws.initial)
         self.history = self.initial
 
+    def __setattr__(self, name: str, value: object) -> None:
+        """Refuse changes: attributes made from the old value would stay."""
+        if "history" in vars(self):  # the last attribute of __init__
+            raise AttributeError(f"Problem.{name}: a problem does not change; make another one")
+        super().__setattr__(name, value)
+
     def at(
         self, time: float, history: History | None = None, since: float | None = None
     ) -> ContactProblem:
@@ -205,6 +211,11 @@ class ContactProblem:
         history = self.history if history is None else history or self.initial
         step = self._with(time=time, since=since, history=history)
         return step.with_interface(self.interface.at(time, step.slip_history))
+
+    @property
+    def by_contact(self) -> bool:
+        """Whether tables have columns of each contact: of several, or of one that has a name."""
+        return len(self.contacts) > 1 or self.contacts[0].name is not None
 
     @property
     def slip_history(self) -> SlipHistory:

@@ -209,3 +209,17 @@ def test_contact_of_a_geometry_tells_whether_a_step_is_regularised() -> None:
     assert not method.semismooth.step.underconstrained
     method.set_load_step(problem.with_geometry([displaced(problem, shifted)]))
     assert method.semismooth.step.underconstrained
+
+
+def test_problems_and_geometries_do_not_change() -> None:
+    """A value that is replaced would leave those that were made from it."""
+    problem = ContactProblem(
+        rectangle(COMM, (0.0, 0.0), (1.0, 1.0), (2, 2)), Body(Linear(1.0, 0.3)), Contact("bottom")
+    )
+    for name in ("contacts", "contact", "time"):
+        with pytest.raises(AttributeError, match=f"{name}: a problem does not change; make anoth"):
+            setattr(problem, name, None)
+    nodes = problem.geometries[0].nodes
+    for array in (problem.interface.gap, problem.nodes.gap, nodes.normal, nodes.points):
+        with pytest.raises(ValueError, match="read-only"):
+            array[:] = 0.0
