@@ -36,8 +36,8 @@ from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import on_root
-from contact.results.quantities import quantities, values_of
-from contact.results.quantity import SUMMARY, SWEEP, is_of
+from contact.results.quantities import contact_key, quantities, values_of
+from contact.results.quantity import CONTACTS, SUMMARY, SWEEP, is_of
 from contact.results.remarks import evaluate_extremes
 from contact.solution import Solution
 from contact.solving import solve_adapted, solve_problem, solve_static, solver_of
@@ -56,6 +56,9 @@ COLUMNS = ("converged", "kkt", "seconds", INPUT)
 
 #: Keys of the summary with lists of fixed length -> names of the entries.
 _ENTRIES = {given.name: given.entries for given in quantities(SUMMARY) if given.component}
+_ENTRIES_OF_CONTACT = {
+    contact_key(given): given.entries for given in quantities(CONTACTS) if given.component
+}
 
 #: Sections that may change without another matrix or other contact nodes.
 LIGHT = ("title", "load", "output", "friction", "fixed")
@@ -108,10 +111,16 @@ def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float
                 "columns",
             )
         for key, numbers in own.items():
-            ends = _ENTRIES.get(key.partition(".")[0], ())
+            ends = _ends(key)
             columns = [f"{key}_{end}" for end in ends] if numbers.size > 1 else [key]
             found |= {column: float(x) for column, x in zip(columns, numbers.flat, strict=False)}
     return found
+
+
+def _ends(key: str) -> Sequence[str]:
+    """Return the ends of the columns of a vector in the summary, or in `contacts` of it."""
+    first, last = key.split(".")[0], key.split(".")[-1]
+    return _ENTRIES_OF_CONTACT.get(last, ()) if first == "contacts" else _ENTRIES.get(first, ())
 
 
 def _numbers(table: Mapping[str, Any], before: str = "") -> dict[str, Array]:
@@ -123,7 +132,7 @@ def _numbers(table: Mapping[str, Any], before: str = "") -> dict[str, Array]:
             found |= _numbers(entry, f"{key}.")
         elif entry is not None:
             numbers = np.asarray(entry)
-            fixed = not numbers.ndim or (numbers.ndim == 1 and key.partition(".")[0] in _ENTRIES)
+            fixed = not numbers.ndim or (numbers.ndim == 1 and len(_ends(key)) > 0)
             if numbers.dtype.kind in "biuf" and fixed and numbers.size:
                 found[key] = numbers
     return found
@@ -131,13 +140,13 @@ def _numbers(table: Mapping[str, Any], before: str = "") -> dict[str, Array]:
 
 def _check_columns(names: Sequence[str]) -> None:
     """Refuse names that no key of a summary has."""
-    known = [quantity.name for quantity in quantities(SUMMARY)]
+    known, written = ([one.name for one in quantities(file)] for file in (SUMMARY, SWEEP))
     for name in names:
         top = name.partition(".")[0]
         if top not in known:
+            words = "a column of each sweep" if top in written else "no key of summary.json"
             raise InputError(
-                f"--columns {name}: no key of summary.json{nearest(top, known)}; accepted: "
-                f"{', '.join(known)}",
+                f"--columns {name}: {words}{nearest(top, known)}; accepted: {', '.join(known)}",
                 "columns",
             )
 
@@ -162,6 +171,12 @@ def sweep(
     """
     _check_columns(columns)
     names = [axis.key for axis in axes]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"--over {name}: stands there twice; accepted: each key once, with all its values",
+                "over",
+            )
     points = [
         dict(zip(names, values, strict=True))
         for values in itertools.product(*(axis.values for axis in axes))

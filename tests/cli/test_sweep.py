@@ -88,6 +88,11 @@ def test_an_evolution_is_swept(sweep, tmp_path):
         (("--over", "friction.mu"), "--over friction.mu: accepted: path.to.key=value,value"),
         (("--over", "friction.mu=0.1,0.1"), "a value stands there twice"),
         (("--over", "friction.mu=0.1,0.10"), "a value stands there twice"),
+        (
+            ("--over", "friction.mu=0.1", "--over", "friction.mu=0.2"),
+            "friction.mu: stands there twice",
+        ),
+        (("--over", "friction.mu=0.1", "--columns", "dissipation"), "a column of each sweep"),
         (("--over", "friction.nu=0.1"), "friction.nu: unknown key"),
         (("--over", "friction.mu=0.1,-1.0"), "friction.mu"),
     ],
@@ -126,7 +131,7 @@ def test_damaged_files_are_refused_and_kept(sweep, tmp_path, capfd):
 
 def test_columns_of_the_summary(sweep):
     """A number, a vector, a table of vectors, an entry of one."""
-    names = "contact_moment,reactions,reaction_moments.left,volume_ratio,error.energy"
+    names = "contact_moment,reactions,reaction_moments.left,volume_ratio,error.energy,contacts"
     status, rows = sweep("--over", "friction.mu=0.2,0.4", "--columns", names)
     assert status == 0
     for row in rows:
@@ -136,6 +141,8 @@ def test_columns_of_the_summary(sweep):
         found = {"contact_moment", "reaction_moments.left", "volume_ratio_least"}
         assert found | {"error.energy"} <= {*row}
         assert not any("moment" in name and name[-2:] in ("_x", "_0") for name in row)
+        assert row["contacts.bottom.force_y"] == row["contact_force_y"]
+        assert row["contacts.bottom.moment"] == row["contact_moment"]
         assert float(row["volume_ratio_least"]) <= float(row["volume_ratio_largest"])
     _, again = sweep("--over", "friction.mu=0.2,0.4", "--columns", names)
     assert again == rows
