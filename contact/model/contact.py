@@ -81,7 +81,8 @@ class Contact(Described):
     on: Part
     """Part of the boundary, or a list of parts, that may touch the foundation."""
     name: Annotated[str, Field(pattern=r"^\S([\s\S]*\S)?$"), Accepted(NAME)] | None = None
-    """Name of its results, `contacts` of the summary. Default: that of its part."""
+    """Name of its results: `contacts` of the summary, and columns of tables. Default: that of its
+    part; a single contact without a name has no columns of its own."""
     law: Literal["signorini", "compliance"] = "signorini"
     """`signorini`: rigid foundation; `compliance`: with a compliant layer in front."""
     against: Part | None = None

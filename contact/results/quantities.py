@@ -144,7 +144,7 @@ AT_OPPOSITE_NODES = (
     ),
     Quantity("displacement", "length", "Displacement.", files=(OPPOSITE,)),
     Quantity("normal", "", "Out of the body.", files=(OPPOSITE,)),
-    Quantity("entry", "", "Number of its contact, from 0.", files=(OPPOSITE,)),
+    Quantity("entry", "", "Number of its contact, from 0.", files=(AGAINST, OPPOSITE)),
 )  # fmt: skip
 
 #: Fields of the body; the derived ones have a companion NAME_cell, cell by cell.
@@ -244,7 +244,7 @@ def named_functionals(problem: ContactProblem) -> dict[str, Functional]:
             continue
         if CONTACTS not in quantity.files:
             found |= quantity.functionals(problem)
-        elif len(problem.contacts) > 1:
+        elif problem.by_contact:
             for number, contact in enumerate(problem.contacts):
                 own = quantity.functionals(problem, number)
                 found |= {f"{column}_{contact.label}": one for column, one in own.items()}
@@ -252,8 +252,8 @@ def named_functionals(problem: ContactProblem) -> dict[str, Functional]:
 
 
 def _contact_columns(given: Any) -> dict[str, Any]:
-    """Return the results of each of several contacts, by columns with its name at the end."""
-    if len(given.problem.contacts) == 1:
+    """Return the results of contacts by columns with their names at the end (`by_contact`)."""
+    if not given.problem.by_contact:
         return {}
     return {
         f"{column}_{name}": value
@@ -262,7 +262,7 @@ def _contact_columns(given: Any) -> dict[str, Any]:
     }
 
 
-def _contact_key(quantity: Quantity) -> str:
+def contact_key(quantity: Quantity) -> str:
     """Return the key of a quantity of a contact in `contacts` of the summary."""
     return quantity.name.removeprefix("contact_")
 
@@ -368,14 +368,15 @@ _RUN = (
     ),
     Quantity(
         "contacts", "", "Results of each contact, by its `name`: "
-        + ", ".join(f"`{_contact_key(q)}` ({q.text})" for q in _OF_CONTACT) + ".",
+        + ", ".join(f"`{contact_key(q)}` ({q.text})" for q in _OF_CONTACT) + ".",
         lambda r: {
-            name: {_contact_key(q): q.of(share) for q in quantities(CONTACTS)}
+            name: {contact_key(q): q.of(share) for q in quantities(CONTACTS)}
             for name, share in r.contacts.items()
         },
     ),
     Quantity(
-        "contact_force_AXIS_NAME", "", "The same of each of several contacts, in a step: "
+        "contact_force_AXIS_NAME", "",
+        "The same of each of several contacts, or of one with a `name`, in a step: "
         + ", ".join(f"`{_contact_column(q)}`" for q in _OF_CONTACT)
         + ", and other components; in 2-D `contact_moment_NAME`.",
         _contact_columns, (STEPS, SWEEP),

@@ -6,6 +6,8 @@ import pytest
 from contact import InputError, build_problem, parse_case, solve
 from contact.interface.grouping import GroupedConductivity
 from contact.results.contact_nodes import contact_table
+from contact.results.quantities import named_functionals, values_of
+from contact.results.quantity import SWEEP
 from forms.laws import PerfectConductivity, ShiftedConductivity
 from tests.problems.everywhere import displacements
 
@@ -33,6 +35,19 @@ def case(contact, cells=(32, 8), **more):
             **more,
         }
     )
+
+
+OF_CONTACT = (
+    "contact_force_x",
+    "contact_force_y",
+    "contact_moment",
+    "contact_area",
+    "max_pressure",
+    "mean_pressure",
+    "stick",
+    "slip",
+    "dissipation",
+)
 
 
 def coulomb(mu):
@@ -95,6 +110,20 @@ def test_each_foot_has_its_own_law(method: str) -> None:
     np.testing.assert_allclose(table["pressure"][second][soft], 5.0 * depth[soft], rtol=1e-6)
 
 
+def test_one_contact_with_a_name_has_its_columns() -> None:
+    """As each of several; one without a name has those of the sum alone."""
+    named, unnamed = solve(case([{"on": "one", "name": "lo"}])), solve(case([{"on": "one"}]))
+    row, plain = values_of(SWEEP, named), values_of(SWEEP, unnamed)
+    share = named.contacts["lo"]
+    assert row["mean_pressure_lo"] == share.mean_pressure > 0
+    assert row["contact_force_y_lo"] == row["contact_force_y"] == plain["contact_force_y"]
+    assert {name for name in row if name not in plain} == {f"{name}_lo" for name in OF_CONTACT}
+    found = {*named_functionals(named.problem)} - {*named_functionals(unnamed.problem)}
+    assert found == {f"{name}_lo" for name in OF_CONTACT} - {
+        f"{name}_lo" for name in ("contact_area", "stick", "slip")
+    }
+
+
 def test_the_smoothed_pressure_stays_on_its_foot() -> None:
     """With a radius beyond the distance of the feet R averages within each of them."""
     friction = {**coulomb(0.3), "radius": 5.0}
@@ -127,6 +156,7 @@ def test_two_electrodes_under_one_body() -> None:
     [
         ([{"on": "one"}, {"on": "one"}], {}, r"\[contact-name\]"),
         ([{"on": "one"}, {"on": "two", "name": "nodes"}], {}, r"stick_nodes .*\[contact-name\]"),
+        ([{"on": "one", "name": "nodes"}], {}, r"stick_nodes .*\[contact-name\]"),
         ([{"on": "one"}, {"on": "bottom"}], {}, r"\[contacts-meet\]"),
         (
             [{"on": "one", "friction": {"mu": 1}}, {"on": "two"}],
