@@ -139,7 +139,8 @@ def _results(solution: Solution) -> list[str]:
     }
     lines = [f"  {name:18}{value}".rstrip() for name, value in rows.items()]
     if solution.error is None:
-        lines.append("estimated discretisation error: none, for the equations are not solved")
+        words = "was interrupted" if solution.outcome.signal else "has not converged"
+        lines.append(f"estimated discretisation error: none, for the run {words}")
     else:
         bound = ", perhaps a lower bound: the mesh may lock" if locks(solution) else ""
         share = f"{100 * solution.error.relative:.2g} % (energy norm){bound}"
