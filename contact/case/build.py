@@ -34,7 +34,7 @@ class Replacements(TypedDict, total=False):
     domain: Domain | None
     law: Law | None
     coefficient: FrictionCoefficient | None
-    friction: FrictionLaw | None
+    friction: FrictionLaw | Friction | None
     foundation: Obstacle | None
     layer: Layer | None
 
@@ -50,7 +50,7 @@ def build_problem(
     domain: Domain | None = None,
     law: Law | None = None,
     coefficient: FrictionCoefficient | None = None,
-    friction: FrictionLaw | None = None,
+    friction: FrictionLaw | Friction | None = None,
     foundation: Obstacle | None = None,
     layer: Layer | None = None,
     refined: bool = False,
@@ -65,7 +65,7 @@ def build_problem(
         Communicator of the mesh.
     domain, law, coefficient, friction, foundation, layer
         Objects that replace the case's mesh, material law, Coulomb's mu(|u_tau|) or the whole
-        friction law, foundation and compliant layer (own p_nu and h_nu).
+        friction or its law, foundation and compliant layer (own p_nu and h_nu).
     refined
         Whether a finer mesh is to follow, as with `[mesh.adapt]`: a press of a shape within a facet
         is not refused then.
@@ -165,7 +165,7 @@ def _contacts(
     foundation: Obstacle | None,
     layer: Layer | None,
     coefficient: FrictionCoefficient | None,
-    law: FrictionLaw | None,
+    law: FrictionLaw | Friction | None,
 ) -> list[Contact]:
     """Return the contacts of a case; objects replace those of its only one."""
     replaced = any(given is not None for given in (coefficient, law, foundation, layer))
@@ -179,7 +179,9 @@ def _contacts(
     for key, contact in case.contacts:
         friction = contact.friction or case.friction or Friction()
         _, electric = case.electric_of(key, contact)
-        if coefficient is not None or law is not None:
+        if isinstance(law, Friction):
+            friction = law
+        elif coefficient is not None or law is not None:
             friction = Friction(coefficient, radius=friction.radius, law=law)
         if electric is not None and electric.amplitude is not None:
             electric = _acting(case, electric)

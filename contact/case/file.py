@@ -334,8 +334,15 @@ def _enter(data: dict[str, Any], path: str, value: Any) -> None:
     *parents, last = path.split(".")
     place: Any = data
     for key in parents:
-        place = place.setdefault(key, {}) if isinstance(place, dict) else place[int(key)]
-    place[last if isinstance(place, dict) else int(last)] = value
+        place = place.setdefault(key, {}) if isinstance(place, dict) else place[_number(key)]
+    place[last if isinstance(place, dict) else _number(last)] = value
+
+
+def _number(text: str) -> int:
+    """Return the number of an entry of a list, from 0; ValueError if it is none."""
+    if not text.isdecimal():
+        raise ValueError
+    return int(text)
 
 
 def _read_value(path: str, text: str, source: str) -> Any:
@@ -372,7 +379,7 @@ def number_at(case: Case, key: str) -> float:
             if isinstance(place, dict):  # parameters of a mesh generator may stand in [mesh] itself
                 place = {**place.get("parameters", {}), **place}[name]
             else:
-                place = place[int(name)]
+                place = place[_number(name)]
     except (KeyError, IndexError, TypeError, ValueError):
         place = None
     if isinstance(place, bool) or not isinstance(place, int | float):

@@ -117,8 +117,9 @@ def _mollifier(nodes: ContactNodes, radius: float) -> PETSc.Mat:
 
 def _omega(square: Array, radius: float) -> Array:
     """Return omega at squared distances, up to a constant; 0 from the radius on."""
-    inside = square < (radius * (1 - 1e-9)) ** 2
-    return np.where(inside, np.exp(1 + radius**2 / np.where(inside, square - radius**2, -1)), 0.0)
+    share = (np.sqrt(square) / radius) ** 2
+    inside = share < (1 - 1e-9) ** 2
+    return np.where(inside, np.exp(1 + 1 / np.where(inside, share - 1, -1)), 0.0)
 
 
 def _ring_mean(points: Array, others: Array, radius: float) -> Array:
@@ -126,7 +127,7 @@ def _ring_mean(points: Array, others: Array, radius: float) -> Array:
     # At the angle theta |x - x_j|^2 grows by 2 r r_j (1 - cos theta); Gauss's rule where omega > 0.
     square = np.sum((points - others) ** 2, axis=1)
     product = 2 * points[:, 0] * others[:, 0]
-    reach = (radius**2 - square) / np.where(product > 0, product, np.inf)
+    reach = (np.square(radius) - square) / np.where(product > 0, product, np.inf)
     widest = np.where(product > 0, np.arccos(np.clip(1 - reach, -1, 1)), np.pi)
     mean = np.zeros_like(square)
     for node, share in zip(*np.polynomial.legendre.leggauss(ANGLES), strict=True):

@@ -52,7 +52,7 @@ else:
         ),
     ]
 
-NAME = "a text without blanks at its ends"
+NAME = "a text of one line without blanks at its ends"
 
 #: Of the layer; the thesis does not give its constants (section 8.1.2).
 COMPLIANT = ReadWith("law", "compliance")
@@ -80,7 +80,7 @@ class Contact(Described):
 
     on: Part
     """Part of the boundary, or a list of parts, that may touch the foundation."""
-    name: Annotated[str, Field(pattern=r"^\S([\s\S]*\S)?$"), Accepted(NAME)] | None = None
+    name: Annotated[str, Field(pattern=r"^\S(.*\S)?$"), Accepted(NAME)] | None = None
     """Name of its results: `contacts` of the summary, and columns of tables. Default: that of its
     part; a single contact without a name has no columns of its own."""
     law: Literal["signorini", "compliance"] = "signorini"

@@ -145,6 +145,11 @@ class Section(BaseModel):
         accepted = f"{', '.join(one)}, or instead {', '.join(other)}"
         raise fault(missing[0] if missing else given[-1], words, accepted, identifier)
 
+    @classmethod
+    def _unknown(cls, name: str, source: str) -> InputError:
+        """Return the error for an argument of another name than its keys."""
+        return unknown(name, keys_of(cls), cls.hints.get(name, "")).within(f"{source}: ")
+
     @property
     def _called(self) -> str:
         """Its name in messages."""
@@ -159,9 +164,7 @@ class Section(BaseModel):
         for name, value in (update or {}).items():
             given[keys.get(name, name)] = value
             if name not in {*keys, *keys.values()}:
-                known = keys_of(type(self))
-                error = unknown(str(name), known, self.hints.get(name, ""))
-                raise error.within(f"{self._called}: ")
+                raise self._unknown(str(name), self._called)
         context = IN_PYTHON | {"tables": [given] if isinstance(self, Described) else []}
         try:
             made.__pydantic_validator__.validate_python(given, self_instance=made, context=context)
@@ -208,6 +211,8 @@ class Described(Section):
         return given
 
     def __init__(self, **given: Any) -> None:
+        for name in given.keys() - {*type(self).model_fields, *keys_of(type(self))}:
+            raise self._unknown(name, type(self).__name__)
         try:
             self.__pydantic_validator__.validate_python(
                 given, self_instance=self, context=IN_PYTHON

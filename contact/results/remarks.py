@@ -185,7 +185,7 @@ def small_strain(solution: Results) -> Iterator[Remark]:
     made = solution.deformation
     if made is None:
         return
-    # To turn by an angle a makes the determinant 1 + a^2, and strains at most 1 + sqrt(3) |eps|. The
+    # To turn by an angle a makes the determinant 1 + a^2, strains at most 1 + sqrt(3) |eps|; the
     # last iterate of a body that nothing holds turns by any angle.
     turned = made.largest_volume - 1 - np.sqrt(3) * made.largest_strain
     if made.largest_strain > SMALL or (solution.converged and turned > SMALL):

@@ -237,6 +237,10 @@ def _factor(
     if energies.size == 0 or energies[0] <= 1e-10 * largest:  # friction alone resists
         return np.inf
     modes = modes / np.sqrt(energies)
-    values = np.linalg.eigvals(modes.T @ (mu[:, None] * presses) @ modes)
+    with np.errstate(over="ignore", invalid="ignore"):
+        coupling = modes.T @ (mu[:, None] * presses) @ modes
+    if not np.isfinite(coupling).all():  # mu is beyond all
+        return 0.0
+    values = np.linalg.eigvals(coupling)
     real = np.abs(values[np.abs(values.imag) <= 1e-8 * np.abs(values)].real)
     return float(1 / real.max()) if real.max(initial=0.0) > 0 else np.inf

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import InputError, Linear, Sphere, load_case, parse_case, solve
+from contact import Friction, InputError, Linear, Sphere, load_case, parse_case, solve
 from contact.case.checks import check_mesh
 from contact.case.file import to_toml
 from contact.mesh.grid import rectangle
@@ -143,6 +143,7 @@ BAD_OVERRIDES = [
     "material.yung=3",
     "load.1.on=top",
     "load.x.on=top",
+    "load.-1.on=top",
     "material.young.x=3",
     "load.0.traction=[0, y]",
     "title='open",
@@ -182,9 +183,11 @@ def test_the_same_as_in_the_case() -> None:
     material = {"young": 10.0, "poisson": 0.3}
     friction = {"law": "coulomb", "mu": 0.3}
     whole = solve(parse_case({**BARE, "mesh": mesh, "material": material, "friction": friction}))
-    bare = solve(parse_case(BARE), **objects())
-    assert bare.converged
-    assert bare.contact_force == pytest.approx(whole.contact_force, rel=1e-9)
+    given = objects()
+    for replacements in (given, given | {"coefficient": None, "friction": Friction(mu=0.3)}):
+        bare = solve(parse_case(BARE), **replacements)
+        assert bare.converged
+        assert bare.contact_force == pytest.approx(whole.contact_force, rel=1e-9)
 
 
 @pytest.mark.parametrize(("key", "name"), [("mesh", "domain"), ("material", "law")])

@@ -43,6 +43,13 @@ def test_a_constant_is_reproduced_to_rounding_at_any_radius(nodes, radius):
     assert np.abs(smooth - 3.7).max() < 1e-13
 
 
+def test_beyond_the_body_it_is_the_mean(nodes):
+    pressure = 1 + np.sin(3 * nodes.points[:, 0])
+    mean = nodes.sum(pressure) / nodes.sum(np.ones_like(pressure))
+    for radius in (1e8, 1e155, 1e300):
+        np.testing.assert_allclose(Smoothing(nodes, radius)(pressure), mean, rtol=1e-12)
+
+
 @pytest.mark.core
 @pytest.mark.parametrize(("degree", "accuracy"), [(1, 1e-12), (2, 2e-3)])
 def test_a_linear_pressure_is_kept_in_the_interior(degree, accuracy):
@@ -92,7 +99,7 @@ def test_it_is_the_identity_at_small_radii(nodes):
     # First order in the radius: at the ends, half of the kernel is cut off.
     assert errors[0] > 1.3 * errors[1]
     assert errors[1] > 1.3 * errors[2]
-    for radius in (1e-3, 1e-9, 0.0):
+    for radius in (1e-3, 1e-9, 1e-300, 0.0):
         assert np.abs(Smoothing(nodes, radius)(pressure) - pressure).max() < 1e-14
 
 

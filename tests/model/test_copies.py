@@ -53,6 +53,13 @@ def test_other_values_are_checked(one: Section, update: dict[str, Any], words: s
         one.model_copy(update=update)
 
 
+def test_arguments_of_no_key_are_named() -> None:
+    with pytest.raises(InputError, match=r"Options: tolerence: unknown key, did you mean tol.*"):
+        NewtonOptions(tolerence=1e-6)  # type: ignore[call-arg]
+    with pytest.raises(InputError, match=r"name: given .*; accepted: a text of one line"):
+        Contact("bottom", name="a\nb")
+
+
 def test_all_else_remains() -> None:
     pushed = LOAD.model_copy(update={"traction": [0.0, "-2*x"]})
     assert pushed == Load("top", [0.0, "-2*x"], amplitude=LOAD.amplitude)

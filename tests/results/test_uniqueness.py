@@ -200,6 +200,20 @@ def test_no_critical_friction_where_supports_let_no_node_slide():
     assert solution.converged and solution.critical_factor == np.inf
 
 
+def test_a_friction_that_overflows_is_critical() -> None:
+    case = parse_case(
+        {
+            "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [4, 2]},
+            "material": {"young": 1e3, "poisson": 0.3},
+            "fixed": [{"on": "top", "displacement": [0.0, -1e-3]}],
+            "contact": {"on": "bottom"},
+            "friction": {"law": "coulomb", "mu": 1e307},
+        }
+    )
+    solution = solve(case)
+    assert solution.converged and solution.critical_factor == 0
+
+
 def test_a_critical_friction_that_is_not_looked_for_is_no_number(monkeypatch):
     case = next(problems("hard", "few-5")).case
     monkeypatch.setattr("contact.results.uniqueness.MOST", 3)
