@@ -66,7 +66,7 @@ def forms(cell):
     return sides if cell in PLANE else {name: sides[name] for name in ("flat", "ring")}
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("element", ELEMENTS)
 @pytest.mark.parametrize("cell", [*PLANE, *SPACE])
 def test_overlaps_are_refused(cell, element):
@@ -348,7 +348,7 @@ def corners(cell, order):
         yield mesh, Body(Linear(YOUNG, POISSON), supports), axis
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("element", ELEMENTS)
 @pytest.mark.parametrize(
     "cell", [*PLANE, *(pytest.param(cell, marks=pytest.mark.slow) for cell in SPACE)]
@@ -370,7 +370,7 @@ def test_corners_are_refused(cell, element):
                 assert least * share < told(domain, given, contact, degree) < 1.01 * share
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize(
     "cell", [*PLANE, *(pytest.param(cell, marks=pytest.mark.slow) for cell in SPACE)]
 )
@@ -505,7 +505,7 @@ def test_overlaps_deeper_than_the_reach(press):
         Problem(far, body("flat", 2, 2), contact)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("element", ELEMENTS)
 @pytest.mark.parametrize(
     "cell", [*PLANE, "hexahedron", pytest.param("tetrahedron", marks=pytest.mark.slow)]

@@ -20,7 +20,7 @@ COMM = MPI.COMM_WORLD
 IN_PLANE = ("triangle", pytest.param("quadrilateral", marks=pytest.mark.slow))
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("counts", [(7, 12), (16, 9)])
 @pytest.mark.parametrize("cell", [*PLANE, *SPACE])
 def test_ellipses_that_touch_are_accepted(cell, counts):
@@ -31,7 +31,7 @@ def test_ellipses_that_touch_are_accepted(cell, counts):
         check_refused(domain, 0.0)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("cell", IN_PLANE)
 def test_waves_that_touch_are_accepted(cell):
     """Their curvature changes by its own size from facet to facet; deeper is an overlap."""
@@ -53,7 +53,7 @@ def of_half_ellipses(cell, order, axis, counts, depth):
     return domain
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("cell", [*IN_PLANE, "hexahedron"])
 def test_curved_cells_that_turn_are_accepted(cell):
     """Edges of a body are where normals at the ends of its facets differ, not those of chords."""
@@ -76,7 +76,7 @@ def test_a_coarse_tip_is_refused_with_the_way_out(cell):
     assert "curve whose" not in str(raised.value)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("cell", PLANE)
 def test_steep_waves_of_curved_cells_are_accepted(cell):
     """Of up to three facets a period, where chords turn by a right angle."""
@@ -88,7 +88,7 @@ def test_steep_waves_of_curved_cells_are_accepted(cell):
             check_refused(domain, depth, 2.0)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("cell", SPACE)
 def test_irregular_bowls_that_touch_are_accepted(cell):
     """Facets of a third of the radius whose normals are up to half a right angle apart."""
