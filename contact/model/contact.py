@@ -9,6 +9,7 @@ from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
+from annotated_types import Predicate
 from pydantic import Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from contact.arguments import expect, one_of
@@ -52,7 +53,7 @@ else:
         ),
     ]
 
-NAME = "a text of one line without blanks at its ends"
+NAME = "a printable text of one line without blanks at its ends"
 
 #: Of the layer; the thesis does not give its constants (section 8.1.2).
 COMPLIANT = ReadWith("law", "compliance")
@@ -80,7 +81,10 @@ class Contact(Described):
 
     on: Part
     """Part of the boundary, or a list of parts, that may touch the foundation."""
-    name: Annotated[str, Field(pattern=r"^\S(.*\S)?$"), Accepted(NAME)] | None = None
+    name: (
+        Annotated[str, Field(pattern=r"^\S(.*\S)?$"), Predicate(str.isprintable), Accepted(NAME)]
+        | None
+    ) = None
     """Name of its results: `contacts` of the summary, and columns of tables. Default: that of its
     part; a single contact without a name has no columns of its own."""
     law: Literal["signorini", "compliance"] = "signorini"

@@ -56,8 +56,14 @@ def test_other_values_are_checked(one: Section, update: dict[str, Any], words: s
 def test_arguments_of_no_key_are_named() -> None:
     with pytest.raises(InputError, match=r"Options: tolerence: unknown key, did you mean tol.*"):
         NewtonOptions(tolerence=1e-6)  # type: ignore[call-arg]
-    with pytest.raises(InputError, match=r"name: given .*; accepted: a text of one line"):
+    with pytest.raises(InputError, match=r"name: given .*; accepted: a printable text"):
         Contact("bottom", name="a\nb")
+
+
+@pytest.mark.parametrize("name", ["a\tb", "a\rb", "a\x00b", "a\x1b[0m", "a\x7fb", "a\u2028b"])
+def test_control_characters_are_refused_in_names(name: str) -> None:
+    with pytest.raises(InputError, match=r"name: given .*; accepted: a printable text"):
+        Contact("bottom", name=name)
 
 
 def test_all_else_remains() -> None:
