@@ -7,6 +7,7 @@ and amplitudes by their keys.
 from __future__ import annotations
 
 import inspect
+import math
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, fields
@@ -69,6 +70,7 @@ from contact.model.fields import field as given_field
 from contact.model.formula import Expression
 from contact.model.messages import accepted_by, describe, keys_of, table_fields, unknown
 from contact.settings import MISSING, Accepted, Number, OrOwn, ReadWith, Words, fault
+from contact.tolerances import HUGE
 from contact.typing import Array
 
 Kind = TypeVar("Kind")
@@ -464,11 +466,12 @@ Part: TypeAlias = Annotated[
     _NAMES,
 ]
 Vector: TypeAlias = Annotated[Few[Number], Accepted("a list of 2 numbers in 2-D, 3 in 3-D")]
-#: A direction, of any length but zero.
+#: The square of its length is neither 0 nor infinite in floating point.
+_directed = Predicate(lambda given: 1 / HUGE <= math.hypot(*given) <= HUGE)
 Direction: TypeAlias = Annotated[
     Few[Number],
-    Predicate(any),
-    Accepted("a vector that is not zero, of 2 numbers in 2-D, 3 in 3-D"),
+    _directed,
+    Accepted("a vector of finite length, not zero, of 2 numbers in 2-D, 3 in 3-D"),
 ]
 Triple: TypeAlias = Annotated[
     tuple[Number, ...],
@@ -476,9 +479,8 @@ Triple: TypeAlias = Annotated[
     as_tuple,
     Accepted("a list of 3 numbers"),
 ]
-#: One that is not zero.
 Axis: TypeAlias = Annotated[
-    Triple, Predicate(any), Accepted("a vector that is not zero, of 3 numbers")
+    Triple, _directed, Accepted("a vector of finite length, not zero, of 3 numbers")
 ]
 
 #: Read from a number or a formula, and written as that.

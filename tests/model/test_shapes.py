@@ -194,6 +194,14 @@ def test_normals_are_the_slope_of_the_distance(name):
         assert 2 * turned <= known
 
 
+@pytest.mark.parametrize("size", [0.0, 1e-200, 1e200])
+def test_a_direction_whose_length_is_no_number_is_refused(size):
+    with pytest.raises(
+        InputError, match=r"Plane: normal: given .*; accepted: a vector of finite length"
+    ):
+        Plane((0.0, 0.0), (0.0, size))
+
+
 class Turned(Plane):
     """A plane whose normals point into it."""
 
