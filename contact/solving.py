@@ -1,7 +1,7 @@
 """Solve a case or a problem: one step, or one load step after the other.
 
     solve > build_problem                       a case becomes a `ContactProblem`
-          > solve_problem                       makes a method, looks for other solutions
+          > solve_problem                       makes a method; criteria of uniqueness
             > solve_static                      or `solve_in_steps` > `LoadStepping`
               > solve_step > Method.solve       by `contact.methods` or `contact.thesis`
                            > evaluated          all residuals from scratch
@@ -328,7 +328,10 @@ def solve_problem(
     monitor: Monitor | None = None,
     solver: Solver = solve_static,
 ) -> Solution:
-    """Solve a problem by a new method, and look for other solutions; not reviewed. Collective."""
+    """Solve a problem by a new method, and evaluate the criteria of uniqueness; not reviewed.
+
+    Collective.
+    """
     clock = time.perf_counter()
     check_variables(problem.body)
     with stop_on_signal(problem.comm, monitor) as stop:

@@ -21,7 +21,7 @@ Law: TypeAlias = Callable[[Value], Value]
 
 
 def penalty_pressure(u_n: Value, gap: Value, eps: Value) -> Value:
-    """Return [u_nu - rho]^+ / eps, the pressure of the penalised problem, (4.32)."""
+    """Return [u_nu - rho]^+ / eps, the pressure of the penalised problem, (4.2) with a gap."""
     return positive_part(u_n - gap) / eps
 
 
@@ -31,7 +31,10 @@ def penalty_friction_modulus(bound: Value, slip: Value, eps: Value) -> Value:
 
 
 def augmentation_form(u: Expr, v: Expr, nu: Expr, r: Value, friction: bool = True) -> Expr:
-    """Return r u_nu v_nu + r u_tau . v_tau, the left-hand side of Step 1 of Algorithm 2."""
+    """Return r u_nu v_nu + r u_tau . v_tau, the left-hand side of Step 1 of Algorithm 2.
+
+    That of the solver, node by node, is `augmentation` in `contact.thesis.uzawa`.
+    """
     form = r * normal_part(u, nu) * normal_part(v, nu)
     if friction:
         form += r * ufl.inner(tangential_part(u, nu), tangential_part(v, nu))
@@ -41,13 +44,16 @@ def augmentation_form(u: Expr, v: Expr, nu: Expr, r: Value, friction: bool = Tru
 def auxiliary_load(
     phi_c: Expr, phi_f: Expr, lambda_c: Expr, lambda_f: Expr, v: Expr, nu: Expr, r: Value
 ) -> Expr:
-    """Return the right-hand side of Step 1 of Algorithm 2 on Gamma_3."""
+    """Return the right-hand side of Step 1 of Algorithm 2 on Gamma_3.
+
+    That of the solver is `displacement_load` in `contact.thesis.uzawa`.
+    """
     normal = (r * phi_c - lambda_c) * normal_part(v, nu)
     return normal + ufl.inner(r * phi_f - lambda_f, tangential_part(v, nu))
 
 
 def penalty(u: Expr, v: Expr, nu: Expr, gap: Expr, eps: Value) -> Expr:
-    """Return [u_nu - rho]^+ v_nu / eps, the form Phi/eps of (4.32)."""
+    """Return [u_nu - rho]^+ v_nu / eps, the form Phi/eps of (4.32) with a gap."""
     return penalty_pressure(normal_part(u, nu), gap, eps) * normal_part(v, nu)
 
 
@@ -64,7 +70,8 @@ def compliance(
     """Return h_nu(phi - phi_F) p_nu(u_nu - rho_0) v_nu.
 
     The form j_1, (6.12), has the rho of the constraint. Here rho_0 is rho less the thickness of the
-    layer, which is thus pressed before the rigid part.
+    layer, which is thus pressed before the rigid part. That of the solver is `layer_pressure` in
+    `contact.interface.foundation`.
     """
     return h_nu(difference) * p_nu(normal_part(u, nu) - rho_0) * normal_part(v, nu)
 
@@ -72,5 +79,8 @@ def compliance(
 def electric_contact(
     u: Expr, phi: Expr, xi: Expr, nu: Expr, psi: Law, phi_l: Law, gap: Expr, phi_f: Value
 ) -> Expr:
-    """Return psi(u_nu - rho) phi_L(phi - phi_F) xi, the form l of (5.11)."""
+    """Return psi(u_nu - rho) phi_L(phi - phi_F) xi, the form l of (5.11).
+
+    That of the solver, node by node, is `FoundationLaw.charge` in `contact.interface.foundation`.
+    """
     return psi(normal_part(u, nu) - gap) * phi_l(phi - phi_f) * xi

@@ -257,10 +257,10 @@ def is_linear(law: Law) -> bool:
 
 
 def secant_stress(law: FormLaw, frozen: Expr, eps: Expr) -> Expr:
-    """Return (k0 - 2g/3) tr(eps) I + 2 g eps with g taken at the frozen strain, (1.13).
+    """Return k0 tr(eps) I + 2 g dev(eps) with g taken at the frozen strain, (1.13).
 
-    A 3 x 3 stress: in plane strain sigma_zz = (k0 - 2g/3) tr eps, which is not zero
-    (Remark 7.1 of the thesis says otherwise).
+    That is (k0 - 2g/3) tr(eps) I + 2 g eps, a 3 x 3 stress: in plane strain
+    sigma_zz = (k0 - 2g/3) tr eps, which is not zero (Remark 7.1 of the thesis says otherwise).
     """
     if isinstance(law, Anisotropic):
         return law.stress(eps)
@@ -271,7 +271,7 @@ def secant_stress(law: FormLaw, frozen: Expr, eps: Expr) -> Expr:
 
 
 def stress(law: FormLaw, eps: Expr) -> Expr:
-    """Return the 3 x 3 stress sigma = (k0 - 2g/3) tr(eps) I + 2 g eps, equation (1.13)."""
+    """Return the 3 x 3 stress sigma = k0 tr(eps) I + 2 g dev(eps), equation (1.13)."""
     return secant_stress(law, eps, eps)
 
 
@@ -282,7 +282,9 @@ def energy_density(law: Hencky | Anisotropic, eps: Expr) -> Expr:
     return law.bulk / 2 * ufl.tr(eps) ** 2 + law.shear_energy(deviator_squared(eps))
 
 
-def secant_form(law: FormLaw, u: Expr, v: Expr, w: Expr, kinematics: Strained = CARTESIAN) -> Expr:
-    """Return the integrand of the Kacanov form B(u; v, w) of section 3.4."""
-    frozen, eps, test = (strain(f, kinematics) for f in (u, v, w))
+def secant_form(
+    law: FormLaw, u_0: Expr, u: Expr, v: Expr, kinematics: Strained = CARTESIAN
+) -> Expr:
+    """Return the integrand of Kacanov's form B(u_0; u, v), (3.28); at u_0 = u that of A, (3.10)."""
+    frozen, eps, test = (strain(f, kinematics) for f in (u_0, u, v))
     return ufl.inner(secant_stress(law, frozen, eps), test)

@@ -5,12 +5,14 @@ Sign convention, stated once, equations (1.23) and (8.2), with the potential phi
     sigma = F eps(u) + e^T grad(phi),     (e^T grad phi)_jk = e_ijk phi_,i
     D     = e eps(u) - beta grad(phi),    D_i = e_ijk eps_jk - beta_ij phi_,j
 
-A of (5.16), with B of the fixed point, is positive definite and not symmetric: `saddle_form`, named
-after the structure [[F, e^T], [-e, beta]] of its matrix, that of a saddle-point system with the
-second row negated. It has the quadratic form
-B(x; x, x) = F eps : eps + beta grad(phi) . grad(phi).
-A-check of (5.27), with B-check, is A with xi negated, symmetric and indefinite, its quadratic form
-convex in u and concave in phi, with a saddle point as solution: `symmetrised_form`.
+The solver takes `symmetrised_form`: A-check of (5.27), with B-check of the fixed point. It is
+symmetric and indefinite, its quadratic form convex in u and concave in phi: the solution is a
+saddle point of it.
+
+`saddle_form` is A of (5.16), with B, for comparison in tests and notebooks: A-check with xi
+negated. It is not symmetric, and positive:
+B(x; x, x) = F eps : eps + beta grad(phi) . grad(phi). Its matrix [[F, e^T], [-e, beta]] is that of
+the saddle-point system with the second row negated.
 
 With the outward normal, D.nu = q_2 on a charged part, div D = q_0 in the body and
 D.nu = psi(u_nu - rho) phi_L(phi - phi_F) on a conductive foundation. On the left-hand side of A
@@ -235,6 +237,7 @@ def saddle_form(
 ) -> Expr:
     """Return the integrand of B(x_0; x, y), at x_0 = x of A, (5.16): positive, not symmetric.
 
+    For comparison: the solver takes `symmetrised_form`.
     x_0 = (u_0, .) is where the secant modulus is frozen, x = (u, phi) the unknown and
     y = (v, xi) the test function.
     """

@@ -104,9 +104,10 @@ class WeakForm:
     def internal_forces(
         self, x: Fields, z: Fields, secant_at: Expr | None, history_at: Expr | None
     ) -> list[Term]:
-        """Return int_Omega sigma : eps(v) + D . grad(xi) dx, (3.10), (5.27).
+        """Return int_Omega sigma : eps(v) + D . grad(xi) dx: A of (3.10), A-check of (5.27).
 
-        With the laws (1) and (4) of docs/theory.md.
+        With `secant_at` u_n they are B(u_n; u, v) of (3.28) and B-check of (5.31). The laws are (1)
+        and (4) of docs/theory.md.
         """
         terms = []
         for law, piezo, strains, dx in self.solids:

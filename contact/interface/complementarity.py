@@ -177,10 +177,10 @@ def linearise(
     # (19b): lambda_f+ = lambda_f + gamma u_tau+ where it sticks.
     friction[sticks] = (multipliers.friction + gamma * slip)[sticks]
     blocks[sticks, :d, :d] += gamma * nodes.tangential_projector[sticks]
-    # (19c): lambda_f+ = s+ e + theta Q u_tau+ where it slips, e = z/|z|, z = lambda_f + c u_tau.
-    z = multipliers.friction + parameters.c * slip
-    size = np.linalg.norm(z, axis=1)
-    e = z / np.maximum(size, 1e-300)[:, None]
+    # (19c): lambda_f+ = s+ e + theta Q u_tau+ where it slips, e = q/|q|, q = lambda_f + c u_tau.
+    q = multipliers.friction + parameters.c * slip
+    size = np.linalg.norm(q, axis=1)
+    e = q / np.maximum(size, 1e-300)[:, None]
     least = np.maximum(s * parameters.c / gamma, 1e-300)  # theta is at most gamma
     theta = s * parameters.c / np.maximum(size - s, least)
     across = theta[:, None, None] * (nodes.tangential_projector - e[:, :, None] * e[:, None, :])

@@ -1,7 +1,7 @@
 """Normal compliance and electrical contact, beside the unilateral constraint and friction.
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
-conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
+conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30), (5.11). Both act
 node by node. Newton's method takes the whole of `layer_block` and `charge_block` once the active
 set no longer changes.
 
@@ -38,7 +38,9 @@ TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True)
 class NormalGraph:
-    """-sigma_nu as a graph of u_nu (Figure 1.6): free, compliant layer, rigid part.
+    """The contact law (1.29), -sigma_nu as a graph of u_nu: free, compliant layer, rigid part.
+
+    That of Figure 1.6, but that the layer presses from rho_0 < rho on, in (1.29) from rho.
 
     Attributes
     ----------
@@ -64,21 +66,21 @@ class NormalGraph:
         s = u_n - self.rho_0
         return self.stiffness * self.p_nu.derivative(np.where(s == 0, TINY, s))
 
-    def pressure(self, z: Array, r: float) -> Array:
-        """Return the resolvent of the maximal monotone graph: p = -sigma_nu with p + r u_nu = z.
+    def pressure(self, q: Array, r: float) -> Array:
+        """Return the resolvent of the maximal monotone graph: p = -sigma_nu with p + r u_nu = q.
 
         It is (3.43) with a layer, and unique for any r > 0 above the slope of a falling p_nu.
         """
-        low, high = self.rho_0, np.minimum(self.gap, z / r)
+        low, high = self.rho_0, np.minimum(self.gap, q / r)
         u_n, layer, steep = high, self.layer_pressure(high), self.layer_slope(high)
-        free, rigid = z <= r * low, z - r * self.gap >= layer
+        free, rigid = q <= r * low, q - r * self.gap >= layer
         done = free | rigid
         # Newton's method in a bracket; every third sweep halves it, should Newton not.
         for sweep in range(90):
-            excess, slope = r * u_n + layer - z, r + steep
+            excess, slope = r * u_n + layer - q, r + steep
             # Below this the excess is rounding in u_n.
             rounding_stress = (
-                4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(u_n) + np.abs(self.rho_0)))
+                4 * EPS * (np.abs(q) + np.abs(slope) * (np.abs(u_n) + np.abs(self.rho_0)))
             )
             done |= np.abs(excess) <= rounding_stress
             if np.all(done):
@@ -89,18 +91,18 @@ class NormalGraph:
             u_n = np.where(done, u_n, np.where(inside, newton, 0.5 * (low + high)))
             layer, steep = self.layer_pressure(u_n), self.layer_slope(u_n)
         # The layer's pressure is exact where it is small, the remainder where it is stiff.
-        pressed = np.where(steep < r, layer, z - r * u_n)
-        return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
+        pressed = np.where(steep < r, layer, q - r * u_n)
+        return np.where(free, 0.0, np.where(rigid, q - r * self.gap, pressed))
 
-    def displacement(self, z: Array, r: float) -> Array:
-        """Return u_nu = (z - `pressure`)/r."""
-        return np.asarray((z - self.pressure(z, r)) / r, dtype=float)
+    def displacement(self, q: Array, r: float) -> Array:
+        """Return u_nu = (q - `pressure`)/r."""
+        return np.asarray((q - self.pressure(q, r)) / r, dtype=float)
 
-    def pressure_slope(self, z: Array, r: float) -> Array:
-        """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""
-        high = np.minimum(self.gap, z / r)
-        free, rigid = z <= r * self.rho_0, z - r * self.gap >= self.layer_pressure(high)
-        slope = self.layer_slope(self.displacement(z, r))
+    def pressure_slope(self, q: Array, r: float) -> Array:
+        """Return the derivative of `pressure` by q: 0 free, 1 rigid, between them in the layer."""
+        high = np.minimum(self.gap, q / r)
+        free, rigid = q <= r * self.rho_0, q - r * self.gap >= self.layer_pressure(high)
+        slope = self.layer_slope(self.displacement(q, r))
         return np.where(free, 0.0, np.where(rigid, 1.0, slope / (slope + r)))
 
 
@@ -260,7 +262,7 @@ class FoundationLaw:
         return np.minimum(self.nodes.normal_component(jump), self.signorini_gap) - self.rho_0
 
     def charge(self, jump: Array, pressure: Array) -> Array:
-        """Return D.nu = psi phi_L(phi - phi_F) at the nodes; nodes with `pressure` are closed."""
+        """Return D.nu = psi phi_L(phi - phi_F) of (5.11); nodes with `pressure` are closed."""
         if self.conductor is None:
             return np.zeros(jump.shape[0])
         return self._psi(jump, pressure) * self.conductor.phi_l(self._difference(jump))

@@ -250,7 +250,7 @@ class NodalFriction:
         return self.history.accumulated + slip
 
     def bound(self, slip: Array, pressure: Array) -> Array:
-        """Return s, mu max(R p, 0) by Coulomb's law, shape (n,). Collective."""
+        """Return s of (3.7), by Coulomb's law mu max(R p, 0), shape (n,). Collective."""
         if self.law is None:
             return np.zeros_like(slip)
         return np.asarray(self.law(self._accumulated(slip), self.smooth(pressure)), dtype=float)

@@ -450,7 +450,7 @@ class InteriorPoint:
         normal, tangent = nodes.normal[rigid], nodes.tangential_projector[frictional]
         blocks[rigid, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
         blocks[frictional, :d, :d] += tangent @ across @ tangent
-        self._step.assemble(self.problem, state, blocks / nodes.weight[:, None, None])
+        self._step.assemble_secant(self.problem, state, blocks / nodes.weight[:, None, None])
 
         def solve(constants: tuple[Array, Array]) -> tuple[Array, ConeStep]:
             force, friction = cones.reduced(constants)

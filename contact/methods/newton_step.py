@@ -65,8 +65,9 @@ class LinearisedLaws:
 
 
 class NewtonStep:
-    """One assembly, one factorisation, one solve of the linearised problem.
+    """The linearised problem of a step: laws, matrix, solve.
 
+    A matrix that has not changed is neither assembled nor factorised again.
     Steps may be those of the same body with another interface. `underconstrained`: a rigid-body
     mode is constrained neither by the supports nor by the nodes that touch in the reference
     configuration. A body that touches at one node rolls until it touches at another one: a
@@ -130,8 +131,11 @@ class NewtonStep:
             )
         return self._operator
 
-    def assemble(self, problem: AnyProblem, state: State, blocks: Array) -> None:
-        """Assemble the operator with nodal blocks and those of layer and charge. Collective."""
+    def assemble_secant(self, problem: AnyProblem, state: State, blocks: Array) -> None:
+        """Update the operator with secants and given nodal blocks, for other methods. Collective.
+
+        With the blocks of layer and charge; that of a step is `_update`.
+        """
         interface = problem.interface
         if interface.foundation.active:
             jump = interface.nodes.jump(state.x)
@@ -146,7 +150,7 @@ class NewtonStep:
         nodes, body = problem.interface.nodes, problem.body
         free = State(state.x, Multipliers.zero(nodes), state.time, state.history)
         size = nodes.block_size
-        self.assemble(problem, free, np.zeros((nodes.nodes.size, size, size)))
+        self.assemble_secant(problem, free, np.zeros((nodes.nodes.size, size, size)))
         step = self.operator.solve(-residual_forces(problem, free))
         return replace(free, x=body.prescribe(body.updated(free.x, step), free.time))
 
@@ -207,7 +211,7 @@ class NewtonStep:
     def _update(
         self, problem: AnyProblem, iterate: EvaluatedState, laws: LinearisedLaws, tangent: bool
     ) -> None:
-        """Assemble and factorise the operator. Collective."""
+        """Update the operator with the matrix of (21) in docs/algorithms.md. Collective."""
         interface, body = problem.interface, problem.body
         state, residuals = iterate.state, iterate.residuals
         blocks = laws.blocks + laws.layer + laws.charge

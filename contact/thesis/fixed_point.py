@@ -7,9 +7,11 @@ in K such that for all v in K
 
 the minimum (3.31) of J_n + j_n on K. With a potential it is a saddle point of x = (u, phi), least
 in u and greatest in phi, with B-check, f_3-check and l-check, (5.28)-(5.32) and (6.33); the thesis
-calls J_n strictly convex, which holds once phi is eliminated. The friction bound
-s_{n+1} = mu(|u_tau|) |R sigma_nu| (`_update_bound`) and, as
-printed, the load follow, with f_3-check and l-check for f_3 and l if there is a potential:
+calls J_n strictly convex, which holds once phi is eliminated. Then the friction bound follows,
+s_{n+1} = mu(|u_tau|) max(R p, 0) (`_update_bound`), p = -sigma_nu of the last Step 1: R p may be
+negative at an iterate, where |R sigma_nu| of (3.6) would hold an open node. In load steps |u_tau|
+is the accumulated slip. As printed the load follows too, with f_3-check and l-check for f_3 and l
+if there is a potential:
 
     f                                           Algorithm 1, Problem (PV)
     f_n     = f_3 - l(x_n, .)                   Algorithm 4, Problem (P~V), with charge
@@ -240,8 +242,8 @@ class FixedPoint(OuterLoop):
             # Secant at zero strain: prescribed values so far strain only the elements beside them.
             self.state = replace(problem.start(), secant_at=problem.body.zero_displacement())
             stuck = sticking_bound(problem)
-            # Iteration 0 is the frictionless problem of the thesis: not with single_loop, nor where
-            # friction alone constrains a rigid-body mode.
+            # Iteration 0 is the "pure contact problem" of section 7.2.1: not with single_loop, nor
+            # where friction alone constrains a rigid-body mode.
             first = 0 if frictional and not self.options.single_loop and stuck is None else 1
             self._z = self._initial_z(0.0, frictional and first > 0)
             self.bound = np.zeros(interface.nodes.gap.size) if stuck is None else stuck

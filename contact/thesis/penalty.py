@@ -1,7 +1,8 @@
 """Algorithm 3: the penalty method, through PETSc's SNES.
 
 The penalised laws replace those of Signorini and Coulomb, node by node: [u_nu - rho]^+/eps_contact
-and s u_tau/(|u_tau| + eps_slip), (4.1)-(4.3), functions of the displacement. The penalised problem
+and s u_tau/(|u_tau| + eps_slip), functions of the displacement: (4.1)-(4.3), there without a gap
+and with one eps. The penalised problem
 (PV_eps) is one nonlinear equation in the displacement. An outer iteration freezes the
 secant modulus of the material and the friction modulus of (4.33); (4.32), with [u_nu - rho]^+ of
 the *new* iterate and a compliant layer, is solved by SNES as a semismooth equation. Outer

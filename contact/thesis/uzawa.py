@@ -1,19 +1,23 @@
 """Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
 
 The augmented Lagrangian of (3.32), (3.33) has the auxiliary variables phi = (phi_c, phi_f) for
-u_nu and the slip, and their multipliers lambda. With u_n and s_n of the outer iterate, unknowns are
-du = u - u_n and z = lambda + r du: against rounding of a small lambda beside a large slip. With
-q = lambda + r u = z + r u_n an iteration is
+u_nu and the slip, and their multipliers lambda. In Algorithms 5, 7 and 9 the thesis writes p for
+them, and phi for the potential; here phi is never the potential. About u_n, with s_n of the outer
+iterate, an iteration takes phi^k and lambda^k to
 
-- Step 1, (3.34): du of (K + r) du = f - F(u_n) + r (phi - u_n) - lambda
+- Step 1, (3.34): u^{k+1} by (K + r) (u^{k+1} - u_n) = f - F(u_n) + r (phi^k - u_n) - lambda^k
   (`FrozenProblem.displacement_load`),
-- Step 2, (3.35), (3.44): phi = (q - P(q))/r (`FrozenProblem.auxiliary`),
-- Step 3, (3.36): lambda + r (u - phi) = P(q) (`FrozenProblem.project`),
+- Step 2, (3.35), (3.44): phi^{k+1} = (q - P(q))/r at q = lambda^k + r u^{k+1}
+  (`FrozenProblem.auxiliary`),
+- Step 3, (3.36): lambda^{k+1} = lambda^k + r (u^{k+1} - phi^{k+1}) = P(q)
+  (`FrozenProblem.project`),
 
 P(q) = ((q_c - r rho)^+, q_f projected onto the disc of radius s_n), (3.43) and section 3.5.2. The
-loop begins with Steps 2 and 3: with lambda = P(q), phi = (q - lambda)/r, and the load of Step 1 is
-r (phi - u_n) - lambda = z - 2 lambda. This map of z to z is accelerated
-(`contact.thesis.acceleration`). Numbers of equations are those of the thesis.
+variable of the loop is z = lambda^k + r (u^{k+1} - u_n), q less r u_n: against rounding of a small
+lambda beside a large slip. It begins with Step 3 at a given z. As r phi = q - lambda, the load of
+Step 1 is r (phi - u_n) - lambda = z - 2 lambda: phi is computed for the thesis's criterion alone.
+This map of z to z is accelerated (`contact.thesis.acceleration`). Numbers of equations are those of
+the thesis.
 
 References
 ----------
@@ -93,7 +97,8 @@ class RelaxationResult:
     """End of a Uzawa block relaxation."""
 
     increment: Array  #: dx on the owned unknowns
-    #: Of lambda + r (u - phi) before Step 3, in equilibrium with u; admissible in the limit alone.
+    #: Of the contact stress of Step 1, lambda^k + r (u^{k+1} - phi^k), in equilibrium with u^{k+1};
+    #: admissible in the limit alone. The next friction bound is taken from them.
     multipliers: Multipliers
     z: Array  #: variable of the next relaxation, about the new iterate, (n, 1 + d)
     iterations: int  #: number of linear solves
@@ -146,11 +151,11 @@ class FrozenProblem:
 
     @cached_property
     def layer(self) -> NormalGraph | None:
-        """The layer, within the constraint; None without one."""
+        """The contact law (1.29); None without a layer, or where its force is given."""
         return self.interface.foundation.normal_graph(self.jump_0)
 
     @cached_property
-    def origin(self) -> Array:
+    def r_u_n(self) -> Array:
         """Augmentation r u_n, tangentially that of the slip, shape (n, 1 + d)."""
         return self.r * displacement_and_slip(self.interface, self.jump_0, self.friction)
 
@@ -185,25 +190,25 @@ class FrozenProblem:
 
         With a layer the normal one is the total pressure -sigma_nu.
         """
-        z = z + self.origin
+        q = z + self.r_u_n
         if self.layer is None:
-            pressure = project_half_line(z[..., 0] - self.r * self.interface.gap)
+            pressure = project_half_line(q[..., 0] - self.r * self.interface.gap)
         else:
             # Laws of users take one value per node.
-            rows = z[..., 0].reshape(math.prod(z.shape[:-2]), z.shape[-2])
-            pressure = np.reshape([self.layer.pressure(row, self.r) for row in rows], z.shape[:-1])
-        friction = project_disc(z[..., 1:], bound)
+            rows = q[..., 0].reshape(math.prod(q.shape[:-2]), q.shape[-2])
+            pressure = np.reshape([self.layer.pressure(row, self.r) for row in rows], q.shape[:-1])
+        friction = project_disc(q[..., 1:], bound)
         return np.concatenate([pressure[..., None], friction], axis=-1)
 
     def projection_derivative(self, z: Array, bound: Array, directions: Array) -> Array:
         """Return the derivatives of `project` along directions, shape (n, 1 + d, k)."""
-        z = z + self.origin
+        q = z + self.r_u_n
         if self.layer is None:
-            slope = np.where(z[:, 0] > self.r * self.interface.gap, 1.0, 0.0)
+            slope = np.where(q[:, 0] > self.r * self.interface.gap, 1.0, 0.0)
         else:
-            slope = self.layer.pressure_slope(z[:, 0], self.r)
+            slope = self.layer.pressure_slope(q[:, 0], self.r)
         normal = slope[:, None, None] * directions[:, :1]
-        tangential = disc_derivative(z[:, 1:], bound, directions[:, 1:])
+        tangential = disc_derivative(q[:, 1:], bound, directions[:, 1:])
         return np.concatenate([normal, tangential], axis=1)
 
     def multipliers(self, jump: Array, stress: Array) -> Multipliers:
@@ -214,8 +219,8 @@ class FrozenProblem:
         return Multipliers.of(self.nodes, contact, stress[:, 1:])
 
     def auxiliary(self, z: Array, bound: Array) -> Array:
-        """Return phi of Step 2, (3.44)."""
-        return (z + self.origin - self.project(z, bound)) * (1 / self.r)
+        """Return phi of Step 2, (3.44): of Algorithms 5, 7 and 9 p_c and p_f."""
+        return (z + self.r_u_n - self.project(z, bound)) * (1 / self.r)
 
     def accelerator(self, depth: int, size: Array, bound: Array) -> ResidualMinimiser:
         """Return the acceleration of the flat z, given the unit of stresses, (n,), and s_n."""
@@ -239,7 +244,7 @@ class FrozenProblem:
 
 @dataclass
 class ThesisCriterion:
-    """The thesis's criterion (3.45), (5.38), (6.41): relative change of unknowns and of phi.
+    """The criterion (3.45), (5.38), (6.41): relative change of unknowns and auxiliary variables.
 
     `domain_norm` is that of L2(Omega) of owned unknowns, `eps` the tolerance.
     """
@@ -249,15 +254,15 @@ class ThesisCriterion:
     eps: float
     last: tuple[Array, Array] | None = None
 
-    def __call__(self, increment: Array, phi: Array) -> tuple[bool, float | None]:
+    def __call__(self, increment: Array, auxiliary: Array) -> tuple[bool, float | None]:
         """Return whether it is met, and the relative change, None in the first iteration."""
-        before, self.last = self.last, (increment, phi)
+        before, self.last = self.last, (increment, auxiliary)
         if before is None:
             return False, None
         norm, on_contact = self.domain_norm, self.frozen.nodes.norm
         displacement = self.frozen.problem.body.owned_part(self.frozen.state.x)
-        change = norm(increment - before[0]) ** 2 + on_contact(phi - before[1]) ** 2
-        size = norm(displacement + increment) ** 2 + on_contact(phi) ** 2
+        change = norm(increment - before[0]) ** 2 + on_contact(auxiliary - before[1]) ** 2
+        size = norm(displacement + increment) ** 2 + on_contact(auxiliary) ** 2
         return change < self.eps**2 * size, float(np.sqrt(change / size)) if size > 0 else 0.0
 
 
@@ -296,7 +301,7 @@ def uzawa_block_relaxation(
         increment = operator.solve(load, rtol if rtol < TOLERANCE else None, increment)
         moved = nodes.jump(increment)
         jump, r_u = frozen.jump_0 + moved, frozen.augmented(moved)
-        # lambda + r (u - phi) of Step 1, in equilibrium with u; not yet lambda of (3.36).
+        # lambda^k + r (u^{k+1} - phi^k), in equilibrium with u^{k+1}; not yet lambda^{k+1}, (3.36).
         stress = 2 * projected - z + r_u
         if iteration == 1:
             stress_unit = interface.component_norms(stress)

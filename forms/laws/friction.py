@@ -57,14 +57,14 @@ class ConstantCoefficient:
 
 @dataclass(frozen=True)
 class SlipCoefficient:
-    """mu(s) = a + b / (rho s + 2), equation (7.16), there with a = 0.5, b = 0.2.
+    """mu(|u_tau|) = a + b / (rho |u_tau| + 2), equation (7.16), there with a = 0.5, b = 0.2.
 
     Parameters
     ----------
     a, b
         Limit for large slip, and twice the excess at zero slip (no unit).
     rho
-        Decay rate (1/length), rho >= 0.
+        Decay rate (1/length), rho >= 0; not the gap of the body.
 
     Raises
     ------
@@ -92,20 +92,20 @@ class SlipCoefficient:
 
     @property
     def maximum(self) -> float:
-        """Upper bound mu* = mu(0) = a + b/2."""
+        """Upper bound mu*: mu(0) = a + b/2, or a where mu grows."""
         return self.a + max(self.b, 0.0) / 2
 
     @property
     def lipschitz(self) -> float:
-        """Lipschitz constant |b| rho / 4, reached at s = 0."""
+        """Lipschitz constant |b| rho / 4, reached at zero slip."""
         return abs(self.b) * self.rho / 4
 
     def __call__(self, slip: Value) -> Value:
-        """Return mu at slips s = |u_tau| >= 0 (length)."""
+        """Return mu at slips |u_tau| >= 0 (length)."""
         return self.a + self.b / (self.rho * slip + 2)
 
     def derivative(self, slip: Value) -> Value:
-        """Return d mu / ds (1/length)."""
+        """Return the derivative of mu by the slip (1/length)."""
         return -self.b * self.rho / (self.rho * slip + 2) ** 2
 
 
