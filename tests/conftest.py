@@ -120,7 +120,8 @@ def bar(tmp_path: Path) -> Path:
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let `make test` run short tests alone, and `make messages` write texts."""
     words = (
-        "no slow tests; each value of each parameter, not all combinations; one a test on 3 ranks"
+        "no slow tests; each value of each parameter, not all combinations; of a test one item on "
+        "3 ranks, and on 2 where it is not core"
     )
     parser.addoption("--short", action="store_true", help=words)
     parser.addoption("--renew", action="store_true", help="write the files of tests/snapshots anew")
@@ -160,7 +161,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     On several ranks, those stay that have each value of each parameter: all combinations run on
     one, or on 2 where a test is not for one. Which rank has nothing, or two neighbours, depends on
-    no combination. With --short that holds on one as well, and one of a test stays on 3.
+    no combination. With --short that holds on one as well; of a test one item stays on 3 ranks, and
+    on 2 where it is not `core`.
     """
     unknown = {name: wrong for name, wrong in _unknown.items() if wrong}
     # Some parameters are for some numbers of ranks; a single item has no others beside it.
@@ -175,7 +177,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if mark is None or _comm.size in _sizes(mark):
             everything = _comm.size == (1 if mark is None or mark.kwargs.get("alone", True) else 2)
             some = some if everything and not short else _covering(some)
-            kept |= set(some[:1] if short and _comm.size > 2 else some)
+            core = _comm.size == 2 and some[0].get_closest_marker("core") is not None
+            kept |= set(some if everything or core or not short else some[:1])
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = [item for item in items if item in kept]
 

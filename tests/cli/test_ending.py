@@ -80,13 +80,19 @@ def test_without_a_compiler_one_message_tells(
     assert "[compiler]\n" in text and "Traceback" not in text
 
 
-@pytest.mark.parametrize("ranks", [1, 3])
+#: Few cells and steps of two cases.
+IN_PLANE = ["mesh.cells=[8, 2]"]
+IN_SPACE = ["mesh.cells=[2, 2, 2]", "evolution.steps=[1, 1, 1]"]
+
+
 @pytest.mark.parametrize(
-    ("case", "changes"),
-    {
-        "bar": ["mesh.cells=[8, 2]"],
-        "press-shear-unload": ["mesh.cells=[2, 2, 2]", "evolution.steps=[1, 1, 1]"],
-    }.items(),
+    ("case", "changes", "ranks"),
+    [
+        ("bar", IN_PLANE, 1),
+        ("bar", IN_PLANE, 3),
+        ("press-shear-unload", IN_SPACE, 1),
+        pytest.param("press-shear-unload", IN_SPACE, 3, marks=pytest.mark.slow),
+    ],
 )
 def test_no_library_says_a_word(case: str, changes: list[str], ranks: int, tmp_path: Path) -> None:
     """In 2-D and 3-D, with pictures: VTK writes past Python."""

@@ -62,7 +62,7 @@ def test_plate_and_lid_press_a_ring_alike(method, seed):
     check(solve(case, domain=between_plates(COMM, seed)))
 
 
-@pytest.mark.parametrize("method", ["newton", "uzawa"])
+@pytest.mark.parametrize("method", ["newton", pytest.param("uzawa", marks=pytest.mark.slow)])
 def test_pressures_balance_the_reaction(method):
     """Uzawa's pressures have differed by 1.8 % here, with all residuals below 1e-9."""
     moduli = {

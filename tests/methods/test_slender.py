@@ -296,6 +296,7 @@ def bridge(length: float) -> dict:
     return case
 
 
+@pytest.mark.slow
 def test_the_block_relaxation_goes_on_where_contact_and_friction_fall_in_turn():
     """It ended at 2e-3 after three relaxations in which the larger one had not fallen."""
     case = parse_case(bridge(200.0))

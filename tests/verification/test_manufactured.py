@@ -17,7 +17,12 @@ from scripts.studies.manufactured_contact import PiezoLayers, Sliding
 from tests.problems.mechanics import state_of
 from tests.problems.piezo import SCALED, potential, pzt
 
-CASES = [(2, 1, (8, 16, 32)), (2, 2, (4, 8, 16)), (3, 1, (3, 6, 12)), (3, 2, (2, 4, 8))]
+CASES = [
+    (2, 1, (8, 16, 32)),
+    (2, 2, (4, 8, 16)),
+    (3, 1, (3, 6, 12)),
+    pytest.param(3, 2, (2, 4, 8), marks=pytest.mark.slow),
+]
 
 
 @pytest.mark.core("2-1-cells0", "2-2-cells1")

@@ -84,7 +84,9 @@ def found(solution, step=-1):
     return stress, a
 
 
-@pytest.mark.parametrize("law", list(EXPECTED))
+@pytest.mark.parametrize(
+    "law", [pytest.param(law, marks=pytest.mark.slow if law in "HK" else ()) for law in EXPECTED]
+)
 def test_plane_strain_between_plates(law):
     solution = run("plane", material(law), path(*ENDS, steps=50))
     known = np.split(np.array(EXPECTED[law]), [3, 5])
@@ -246,7 +248,8 @@ def test_hill_s_closed_form_of_the_hollow_sphere():
 
 
 @pytest.mark.parametrize(
-    ("young", "limit", "front"), [(1.0, 0.004, 1.4151862), (200e3, 250.0, 1.25)]
+    ("young", "limit", "front"),
+    [pytest.param(1.0, 0.004, 1.4151862, marks=pytest.mark.slow), (200e3, 250.0, 1.25)],
 )
 def test_hollow_sphere_under_pressure_and_unloaded(young, limit, front):
     """Within .2 %, of second order: straight edges follow the sphere no better."""
