@@ -154,16 +154,27 @@ def foundation(run: Run, scale: float) -> Any:
     distance, gap = np.full((2, len(run.table["gap"])), np.nan)
     body = (skin.points + scale * skin["displacement"]).astype(float)
     known: list[Callable[[Array], Array]] = []
+    placed = {
+        entry: run.motions.get(entry, np.zeros(6))
+        for entry in run.shapes
+        if entry in run.motions or entry not in run.moving
+    }
+    drawn: set[int] = set()
     for table in run.contacts:
         entry = table["entry"][0]
         if not np.all(table["rigid"]):
             continue
         way = scalings(run, table, None)[0]
         more = (scale - 1) * way.more
-        if entry in run.shapes and (entry in run.motions or entry not in run.moving):
-            facets = body[faces[(skin["entry"] == entry)[faces].all(axis=1)]].mean(axis=1)
-            motion = run.motions.get(entry, np.zeros(6))
-            known.append(_placed(run.shapes[entry], motion, table, more, facets, run.diameter))
+        if entry in drawn:
+            continue
+        if entry in placed:
+            shape, motion = run.shapes[entry], placed[entry]
+            # One shape of several contacts has one surface.
+            here = [k for k in placed if run.shapes[k] == shape and np.all(placed[k] == motion)]
+            drawn.update(here)
+            facets = body[faces[np.isin(skin["entry"], here)[faces].all(axis=1)]].mean(axis=1)
+            known.append(_placed(shape, motion, table, more, facets, run.diameter))
         else:
             own = run.table["entry"] == entry
             distance[own] = way.distance + more
@@ -174,10 +185,10 @@ def foundation(run: Run, scale: float) -> Any:
         near = body[skin["rigid"] > 0]
         room = AROUND * np.ptp(near, axis=0).max()
         box = np.array([near.min(axis=0) - room, near.max(axis=0) + room])
-    for shape in known:
-        surface = _surface(shape, box)
+    for distance_from in known:
+        surface = _surface(distance_from, box)
         for other in known:
-            if other is not shape and surface.n_cells:
+            if other is not distance_from and surface.n_cells:
                 surface["other"] = other(surface.points)
                 surface = surface.clip_scalar(scalars="other", value=0.0, invert=False)
         found = found.append_polydata(surface)

@@ -226,6 +226,19 @@ def test_planes_that_meet_end_there() -> None:
     )
 
 
+def test_a_shape_of_two_contacts_is_drawn_once() -> None:
+    """Two surfaces at one place speckle."""
+    halves = {
+        on: {"side": "bottom", "from": [low, 0.0], "to": [high, 1.0]}
+        for on, low, high in (("one", 0.0, 1.0), ("two", 1.5, 2.0))
+    }
+    mesh = {"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [4, 2, 2], "parts": halves}
+    ball = {"shape": "sphere", "centre": [1.0, 0.5, -3.0], "radius": 3.0}
+    both = pressed(contact=[{"on": on, "foundation": ball} for on in halves], mesh=mesh)
+    single = pressed(contact={"on": "bottom", "foundation": ball})
+    assert foundation(both, 1.0).n_cells == pytest.approx(foundation(single, 1.0).n_cells, rel=0.05)
+
+
 def test_the_pressure_of_held_nodes_is_not_known() -> None:
     """They are no contact nodes; they had the colour of no pressure."""
     free = ["free", 0.0, 0.0]
