@@ -367,7 +367,7 @@ def test_several_points_are_projected_as_one_after_the_other(nodes, layer):
     gap = np.full(nodes, 0.5)
     law = NormalGraph(Compliance(2.0), np.ones(nodes), 0 * gap, gap) if layer else None
     frozen = SimpleNamespace(
-        layer=law, r=3.0, origin=np.zeros((nodes, 3)), interface=SimpleNamespace(gap=gap)
+        layer=law, r=3.0, r_u_n=np.zeros((nodes, 3)), interface=SimpleNamespace(gap=gap)
     )  # fmt: skip
     project = partial(FrozenProblem.project, frozen, bound=np.full(nodes, 0.4))
     points = rng.normal(size=(5, nodes, 3))
