@@ -106,6 +106,11 @@ def collapse(
     return space, np.asarray(dofs[0] if several else dofs, dtype=np.int32)
 
 
+def vtk_needs_display() -> bool:
+    """Whether VTK aborts where it draws without a display, as before 9.4."""
+    return bool(import_module("pyvista").vtk_version_info < (9, 4))
+
+
 def surface(grid: Any) -> Any:
     """Surface of a pyvista grid; of cells of degree 2 four facets of each."""
     extract = grid.extract_surface

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import logging
 import os
+import subprocess
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -97,13 +99,30 @@ def drawable() -> bool:
     if has_display():
         return True
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # VTK would warn of it, and draws
-    if pyvista.vtk_version_info < (9, 4):  # aborts without a display
-        try:
-            pyvista.start_xvfb()
-        except OSError:
-            logger.warning("nothing is drawn in 3-D: VTK before 9.4 needs a display or Xvfb")
-            return False
+    if _compat.vtk_needs_display() and not start_display():
+        logger.warning("nothing is drawn in 3-D: VTK before 9.4 needs a display or Xvfb")
+        return False
     return True
+
+
+def start_display() -> bool:
+    """Start an X server without a screen, until this program ends; return whether it answers."""
+    # That of pyvista has the number of any other one, and stays.
+    reader, writer = os.pipe()
+    size = ["-screen", "0", "1920x1440x24", "-nolisten", "tcp"]
+    command = ["Xvfb", f":{1000 + os.getpid() % 50000}", "-displayfd", str(writer), *size]
+    try:
+        quiet = subprocess.DEVNULL
+        server = subprocess.Popen(command, pass_fds=[writer], stdout=quiet, stderr=quiet)
+    except OSError:
+        return False
+    finally:
+        os.close(writer)
+    atexit.register(server.terminate)
+    with os.fdopen(reader) as ready:  # its number, or the end of one that does not start
+        number = ready.readline().strip()
+    os.environ["DISPLAY"] = f":{number}"
+    return bool(number)
 
 
 def render(ax: Axes, camera: Camera, add: Callable[[Any], None], pixels: int = 1600) -> None:
