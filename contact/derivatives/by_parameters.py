@@ -89,6 +89,10 @@ LEAST, MOST, AIM = 1e-8, 1e-4, 3e-7
 #: Change of a gap with a parameter, over the largest of all, that is told from rounding.
 SEEN = 1e-3
 
+#: Difference of the equations at a parameter's value from those of the solution, over their change
+#: by a step, that is told from the curvature, and the least.
+OTHER, SOME = 10.0, 1e-5
+
 #: Most choices of a step, and largest factor.
 TRIES, FACTOR = 6, 1e4
 
@@ -278,8 +282,8 @@ def family_of(
 ) -> Family:
     """Return the problems beside a parameter, for the steps of a solution. Collective.
 
-    InputError if no value beside it is accepted, or contact nodes, mesh or internal variables
-    change.
+    InputError if no value beside it is accepted, contact nodes, mesh or internal variables change,
+    or the problem at the value is not that of the solution.
     """
     base, step, family, fault = steps[0][0], STEP * (abs(parameter.value) or 1.0), None, None
     for _ in range(TRIES):
@@ -301,6 +305,7 @@ def family_of(
     if family is None:
         assert fault is not None
         raise fault
+    _check_value(name, parameter, family, steps[-1])
     closing = _closing(base, family)
     if not closing:
         return family
@@ -364,18 +369,33 @@ def _closing(base: ContactProblem, family: Family) -> list[float]:
     ]
 
 
+def _check_value(
+    name: str, parameter: Parameter, family: Family, last: tuple[ContactProblem, State]
+) -> None:
+    """Refuse a parameter whose problem at its value is not that of the solution. Collective."""
+    beside, change = family.problems[0], _apart(family.problems[0], family.problems[-1], last)
+    if _apart(beside, last[0], last) > OTHER * max(change, SOME):
+        raise InputError(
+            f"{name}: the problem at {parameter.value:g} is not that of the solution; accepted: "
+            "the value of the solution, and a function that returns its problem there",
+            "parameter",
+        )
+
+
+def _apart(one: ContactProblem, other: ContactProblem, step: tuple[ContactProblem, State]) -> float:
+    """Return the relative change of the equations between problems at a step. Collective."""
+    base, state = step
+    active, norms = active_set(base, state), reference_norms(base, state)
+    here, there = (equations(*at(problem, state), active) for problem in (one, other))
+    forces = base.body.norm(here.forces - there.forces) / norms[0]
+    return max(forces, base.nodes.norm(here.conditions - there.conditions) / norms[1])
+
+
 def _change(family: Family, steps: Sequence[tuple[ContactProblem, State]]) -> float:
     """Return the largest relative change of the equations of all steps. Collective."""
     largest = 0.0
-    for base, state in reversed(steps):
-        active, norms = active_set(base, state), reference_norms(base, state)
-        one, other = (
-            equations(*at(problem, state), active)
-            for problem in (family.problems[0], family.problems[-1])
-        )
-        forces = base.body.norm(one.forces - other.forces) / norms[0]
-        conditions = base.nodes.norm(one.conditions - other.conditions) / norms[1]
-        largest = max(largest, forces, conditions)
+    for step in reversed(steps):
+        largest = max(largest, _apart(family.problems[0], family.problems[-1], step))
         if largest >= LEAST:  # large enough: no earlier steps
             break
     return largest

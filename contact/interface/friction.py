@@ -197,7 +197,12 @@ def _check_constants(name: str, law: FrictionLaw) -> None:
     slip, pressure = np.tile(SAMPLES, PRESSURES.size), np.repeat(PRESSURES, SAMPLES.size)
     bounds = sampled(name, slip.shape, lambda: law(slip, pressure))
     if bounds is not None:
-        largest = float(np.nanmax(bounds[0] / pressure, initial=0.0))
+        ratio = bounds[0] / pressure
+        least = float(np.nanmin(ratio, initial=0.0))
+        if least < 0:
+            words = f"{name}: s/p, the coefficient, is {least:.4g} at a sample"
+            raise InputError(f"{words}; accepted: values >= 0", "negative")
+        largest = float(np.nanmax(ratio, initial=0.0))
         fits = largest <= law.maximum * (1 + 1e-9)
         words = f"an upper bound of s/p, which is {largest:.4g} at a sample"
         expect(f"{name}: maximum", law.maximum, words, fits)

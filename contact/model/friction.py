@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Discriminator, Tag
 
@@ -96,12 +96,13 @@ class Friction(Described):
         given = [one for one in (coefficient, tresca, mu, law) if one is not None]
         if len(given) > 1:
             raise InputError("Friction: accepted: one of coefficient, tresca, mu and law", "value")
+        more: dict[str, Any] = {"radius": radius} if radius else {}
         if tresca is not None:
-            super().__init__(law="tresca", bound=tresca)
+            super().__init__(law="tresca", bound=tresca, **more)
         elif given:
-            super().__init__(law="coulomb", mu=given[0], radius=radius)
+            super().__init__(law="coulomb", mu=given[0], **more)
         else:
-            super().__init__(law="none")
+            super().__init__(law="none", **more)
 
     @property
     def acts(self) -> bool:

@@ -15,6 +15,7 @@ from contact.body.loads import wrong_load
 from contact.errors import InputError
 from contact.interface.foundation import FoundationLaw
 from contact.interface.placing import FoundationPlacement
+from contact.model.body import Electrode
 from contact.model.fields import values_at
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
@@ -134,7 +135,8 @@ def _check_sizes(problem: ContactProblem) -> None:
 def check_supports(problem: ContactProblem) -> None:
     """Refuse different values of two supports for one component on a common facet. Collective.
 
-    InputError if they differ at the time of the problem by more than rounding.
+    And of a support and a rigid part or an electrode. InputError if they differ at the time of the
+    problem by more than rounding.
     """
     space, time = problem.body.space, problem.time
     for i, j in combinations(range(len(problem.description.fixed)), 2):
@@ -152,6 +154,53 @@ def check_supports(problem: ContactProblem) -> None:
                     f"as fixed.{i} has there{when}",
                     "supports",
                 )
+
+    for place, on_facets, (given, fixed) in _tied_otherwise(problem):
+        if on_facets:
+            raise InputError(
+                f"{place}, where a support fixes {fixed}, and not {given}; accepted: equal values, "
+                "one of them alone, or parts that share no facets",
+                "supports",
+            )
+
+
+def _tied_otherwise(problem: ContactProblem) -> Iterator[tuple[str, bool, tuple[str, str]]]:
+    """Say which rigid parts and electrodes have a node that a support fixes otherwise. Collective.
+
+    Their key with the point, whether it is on a common facet, and the values of both.
+    """
+    body, space, d, time = problem.body, problem.body.space, problem.dim, problem.time
+    if not problem.description.fixed:
+        return
+    unknowns = body.nodal(body.prescribe(body.zero_displacement(), time))
+    for group in body.global_unknowns.groups:
+        if not group.has_tied_nodes:
+            continue
+        electric = isinstance(group.description, Electrode)
+        facets = problem.domain.facets_anywhere(group.part)
+        nodes = fem.locate_dofs_topological(space, d - 1, facets)
+        points = space.tabulate_dof_coordinates()[nodes, :d]
+        tied = group.motion(points, body.block_size) @ group.prescribed(time)
+        own = slice(d, None) if electric else slice(0, d)
+        both = np.stack([tied[:, own], unknowns[nodes, own]], axis=1)
+        size = problem.comm.allreduce(float(np.abs(both).max(initial=0.0)), op=MPI.MAX)
+        rounding = NEGLIGIBLE * size + (1.0 if electric else problem.domain.size) * EPS
+        differ = np.ptp(both, axis=1).max(axis=1) > rounding
+        shared = [_shared(problem, fixed.on, group.part)[0] for fixed in problem.description.fixed]
+        common = fem.locate_dofs_topological(space, d - 1, np.unique(np.concatenate(shared)))
+        on_facets = np.isin(nodes, common)
+        both = np.where(np.abs(both) <= rounding, 0.0, both)
+        points = np.where(np.abs(points) < EPS * problem.domain.size, 0.0, points)
+        # Those on common facets first.
+        rows = np.column_stack([~on_facets, points, both[:, 0], both[:, 1]])[differ]
+        rows = np.concatenate(problem.comm.allgather(rows[np.argsort(rows[:, 0])][:1]))
+        if rows.size > 0:
+            apart, *row = rows[rows[:, 0].argmin()] + 0.0
+            unit = body.phi_scale if electric else 1.0
+            values = np.split(unit * np.array(row[d:]), 2)
+            at, given, by = (f"({', '.join(f'{x:.4g}' for x in v)})" for v in (row[:d], *values))
+            key = "electrode" if electric else "rigid"
+            yield f"{key} on {group.part!r}: at {at}", not apart, (given, by)
 
 
 def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterator[str]:
@@ -180,6 +229,16 @@ def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterato
                     "each refinement"
                 )
                 break
+    for time in times:
+        found = [*_tied_otherwise(problem.at(time))]
+        for place, _, (given, fixed) in found:
+            yield (
+                f"{place}, where it meets a support that fixes {fixed}, and not {given}: the "
+                "support counts at their common nodes, and fields beside them grow with each "
+                "refinement"
+            )
+        if found:
+            break
 
 
 def _differing(

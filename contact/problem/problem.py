@@ -273,6 +273,10 @@ class ContactProblem:
         if contact.conductor is not None:
             with on_all_ranks(self.comm):
                 contact.conductor.check()
+                if not self.piezoelectric:
+                    raise InputError(
+                        f"{key}: a conductor; accepted: one before a piezoelectric body", "piezo"
+                    )
         assert contact.friction is not None  # filled in above
         body, arguments = self.body, (contact.obstacle, key, contact.press)
         if contact.against is not None:

@@ -16,6 +16,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError, counted
 from contact.interface.mortar.lumping import JumpRows, Lumping
 from contact.interface.mortar.surface import surface_of
+from contact.interface.nodes import make_read_only
 from contact.mesh.cells import Shape, shape_of
 from contact.mesh.entities import paths, places_of
 from contact.mesh.owners import Owners
@@ -99,6 +100,10 @@ class ContactResult:
     _problem: ContactProblem
     potential: Array | None = None
     charge: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Mark the arrays as read-only: other results are computed from the state."""
+        make_read_only(self)
 
     def __repr__(self) -> str:
         """Return the numbers of nodes and of nodes in contact, and the largest pressure."""

@@ -13,12 +13,22 @@ import pytest
 from mpi4py import MPI
 
 import meshes
-from contact import Body, Contact, Fixed, Friction, InputError, Linear, Problem, SlipCoefficient
+from contact import (
+    Body,
+    Contact,
+    Electric,
+    Fixed,
+    Friction,
+    InputError,
+    Linear,
+    Problem,
+    SlipCoefficient,
+)
 from contact.interface.multipliers import Multipliers
 from contact.mesh.grid import rectangle
 from contact.problem.residuals import evaluate
 from contact.solving import solve
-from forms.laws import ConstantCoefficient
+from forms.laws import ConstantCoefficient, Coulomb
 from tests.problems.mechanics import bar, leaning_block
 from tests.problems.rings import between_plates, squeezed
 
@@ -123,6 +133,21 @@ def problem(contact, friction=None):
     return Problem(domain, body, contact, friction)
 
 
+class Pulling(Coulomb):
+    """A law whose friction pulls."""
+
+    def __init__(self):
+        super().__init__(ConstantCoefficient(0.3))
+
+    def __call__(self, slip, pressure):
+        """Return the bound."""
+        return -0.3 * pressure + 0 * slip
+
+    def by_pressure(self, slip, pressure):
+        """Return the derivative by the pressure."""
+        return -0.3 + 0 * slip
+
+
 class Negative(ConstantCoefficient):
     """A coefficient that pulls."""
 
@@ -140,11 +165,27 @@ class Negative(ConstantCoefficient):
         (lambda: Friction(tresca=lambda x: 1.0 - x[0]), "bound"),
         (lambda: Friction(tresca=np.inf), "bound"),
         (lambda: Friction(Negative()), "coefficient"),
+        (lambda: Friction(law=Pulling()), "law: s/p, the coefficient, is -0.3"),
     ],
 )
 def test_what_resists_is_not_negative(friction, said):
     with pytest.raises(InputError, match=rf"{said}.*\[(negative|not-finite)\]"):
         problem(Contact("bottom", friction=friction()))
+
+
+def test_what_has_no_effect_is_refused():
+    for law in ({}, {"tresca": 0.01}):
+        with pytest.raises(InputError, match=r"radius"):
+            Friction(radius=0.1, **law)
+    with pytest.raises(InputError, match=r"contact.*\[piezo\]"):
+        problem(Contact("bottom", conductor=Electric(k_e=1.0)))
+
+
+def test_values_at_contact_nodes_cannot_be_changed():
+    """Results after that were of two kinds."""
+    contact = solve(problem(Contact("bottom"))).contact
+    with pytest.raises(ValueError, match="read-only"):
+        contact.pressure[:] = 0.0
 
 
 @pytest.mark.parametrize(

@@ -223,6 +223,24 @@ def test_a_wrong_sign_of_normals_is_refused():
             measured(Turned((0.0, 0.0), up), points, normal, comm, "contact")
 
 
+class Long(Plane):
+    """A plane whose normals are twice as long."""
+
+    def distance(self, points):
+        """Return distances and normals."""
+        distance, normal = super().distance(points)
+        return distance, 2 * normal
+
+
+def test_normals_that_are_no_unit_vectors_are_refused():
+    """Forces were wrong by some per cent."""
+    points = 5.0 + POINTS[:30, :2]
+    with pytest.raises(InputError, match=r"contact.foundation: .*\[shape-normals\]"):
+        measured(
+            Long((0.0, 0.0), (1.0, 2.0)), points, np.zeros_like(points), MPI.COMM_SELF, "contact"
+        )
+
+
 class AtAnEdge(Plane):
     """A plane whose normal is wrong at the points of one rank."""
 

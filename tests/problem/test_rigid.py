@@ -15,6 +15,7 @@ from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
+from contact.mesh.grid import rectangle
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.model.body import Body, Fixed
 from contact.model.contact import Contact
@@ -245,6 +246,41 @@ def test_bad_motions_are_refused(changes, words):
 def test_bad_rigid_parts_are_refused(rigid, words):
     with pytest.raises(InputError, match=words):
         build_problem(plate(rigid=rigid), SELF)
+
+
+def supported(motion, on="top", **more):
+    """Return a block with a supported top, and a rigid part."""
+    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (8, 4))
+    fixed = Fixed("top", **({"displacement": [0.002, -0.01]} | more))
+    body = Body(Linear(1.0, 0.3), fixed, rigid=Rigid(on, motion))
+    return ContactProblem(domain, body, Contact("bottom"))
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("motion", "more"),
+    [
+        (Motion([0.0, -0.02]), {}),
+        (Motion([0.0, -0.01]), {"displacement": [0.002, "free"]}),
+        (Motion([0.0, -0.01], 0.01, centre=[1.0, 1.0]), {"displacement": ["free", -0.01]}),
+        (Motion([0.0, None], force=[0.0, -0.3]), {"displacement": [0.002, "free"]}),
+    ],
+    ids=["both", "x", "rotation", "force"],
+)
+def test_a_support_that_moves_a_rigid_part_otherwise_is_refused(motion, more):
+    """It won at each node, and the motion that was given was reported."""
+    with pytest.raises(InputError, match=r"rigid on 'top': at \(.*\), where .*\[supports\]"):
+        solve(supported(motion, **more))
+
+
+@pytest.mark.parallel
+def test_a_support_that_moves_a_rigid_part_alike_is_accepted():
+    solution = solve(supported(Motion([0.002, -0.01])))
+    without = solve(ContactProblem(solution.problem.domain, Body(Linear(1.0, 0.3), Fixed(
+        "top", [0.002, -0.01])), Contact("bottom")))  # fmt: skip
+    assert solution.contact_force == pytest.approx(without.contact_force, rel=1e-9)
+    beside = solve(supported(Motion([0.0, 0.0]), "left"))
+    assert any("rigid on 'left': at (0, 1), where it meets" in said for said in beside.warnings)
 
 
 @pytest.mark.parametrize(("end", "constrained"), [(2.0, True), (1.2, False)])

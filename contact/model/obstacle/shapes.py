@@ -36,6 +36,9 @@ STEPS = 200
 #: Most points at which normals are checked.
 CHECKED = 50
 
+#: Largest difference of the length of a normal from 1.
+UNIT = 1e-6
+
 #: The description of the key `shape`.
 NAME = Field(description="Name of the shape, by which the case file selects it.")
 
@@ -105,8 +108,9 @@ class Shape(ABC):
 
     @np.errstate(all="ignore")
     def turned_normals(self, points: Array) -> tuple[int, int, str]:
-        """Return at how many of some points normals are against the slope, of how many, and one.
+        """Return at how many of some points normals are wrong, of how many, and one of them.
 
+        They are against the slope, or no unit vectors.
         The slope is the difference quotient of the distance, at some of the points from which the
         shape is seen, shape (n, d).
         """
@@ -120,7 +124,8 @@ class Shape(ABC):
         )
         slope = (ahead - behind) / (2 * h)
         along = np.einsum("nd,nd->n", normal, slope)
-        turned = np.flatnonzero(along < 0)
+        wrong = (along < 0) | (np.abs(np.linalg.norm(normal, axis=1) - 1) > UNIT)
+        turned = np.flatnonzero(wrong)
         words = ""
         if turned.size > 0:
             given, there, place = (
