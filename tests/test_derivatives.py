@@ -179,7 +179,7 @@ def test_a_problem_in_python_and_a_function():
         sensitivity(run, ["rigid_y"], ["material.young"])
     # The problem at the value of a parameter is that of the solution.
     for value in (1.001, 2.0):
-        with pytest.raises(InputError, match=r"E: the problem at .*\[parameter\]"):
+        with pytest.raises(InputError, match=r"E: the problem at .*\[value\]"):
             sensitivity(run, work, {"E": Parameter(value, at)})
 
 

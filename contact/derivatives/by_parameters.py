@@ -378,7 +378,7 @@ def _check_value(
         raise InputError(
             f"{name}: the problem at {parameter.value:g} is not that of the solution; accepted: "
             "the value of the solution, and a function that returns its problem there",
-            "parameter",
+            "value",
         )
 
 
